@@ -29,6 +29,7 @@ class Agent:
     available_at : s; the agent does not move before.
     fuel_per_metre : score units lost per m flown (slides, "fuel").
     range : m that it may fly in all, the way back to `base` included; infinite by default.
+    endurance : s from `available_at` until it must be back at `base` (or done, without one).
     equipment : names of what it carries (e_i).
     bundle_limit : most tasks it takes at once (L_t); None for no limit.
     base : where it must be able to return to; None if it need not.
@@ -41,6 +42,7 @@ class Agent:
     available_at: float = 0.0
     fuel_per_metre: float = 0.0
     range: float = math.inf
+    endurance: float = math.inf
     equipment: frozenset[str] = frozenset()
     bundle_limit: int | None = None
     base: Position | None = None
@@ -54,6 +56,7 @@ class Agent:
         check.number("available_at", self.available_at, low=0.0)
         check.number("fuel_per_metre", self.fuel_per_metre, low=0.0)
         check.number("range", self.range, low=0.0, low_open=True, infinite=True)
+        check.number("endurance", self.endurance, low=0.0, low_open=True, infinite=True)
         if self.bundle_limit is not None and self.bundle_limit < 1:
             check.fault("bundle_limit", f"is {self.bundle_limit}", "Give 1 or more, or leave it out.")
         check.done()
@@ -75,6 +78,8 @@ class Task:
     agents_required : seats (L_j).
     equipment : names that the group must bring (e_j).
     prerequisites : ids of tasks that come first (P_j).
+    revisit_at : s; when a repeated visit is wanted. None for an ordinary task.
+    revisit_width : s; how far from `revisit_at` the reward falls to 1/e.
     """
 
     id: str
@@ -88,6 +93,8 @@ class Task:
     agents_required: int = 1
     equipment: frozenset[str] = frozenset()
     prerequisites: tuple[str, ...] = ()
+    revisit_at: float | None = None
+    revisit_width: float = 60.0
 
     def __post_init__(self) -> None:
         check = _Checker("task", self.id)
@@ -97,6 +104,9 @@ class Task:
         check.number("end", self.end, low=0.0, infinite=True)
         check.number("duration", self.duration, low=0.0)
         check.number("discount", self.discount, low=0.0)
+        if self.revisit_at is not None:
+            check.number("revisit_at", self.revisit_at, low=0.0)
+        check.number("revisit_width", self.revisit_width, low=0.0, low_open=True)
         if self.end < self.start:
             check.fault(
                 "end", f"is {self.end} s, before start {self.start} s", "Let the window end after it starts."
@@ -114,12 +124,15 @@ class Mission:
     ----------
     agents, tasks : in any order; ids are unique over both lists together.
     compatible : for each agent type the task types it may do; a type that is absent may do all.
+    distance_step : m; travelled distances are rounded down to a multiple of it (0 for exact), as
+        some public benchmarks prescribe.
     name : for reports.
     """
 
     agents: tuple[Agent, ...]
     tasks: tuple[Task, ...]
     compatible: dict[str, frozenset[str]] = field(default_factory=dict)
+    distance_step: float = 0.0
     name: str = "mission"
 
     def __post_init__(self) -> None:
