@@ -6,6 +6,8 @@ reason). Failing to converge is a status of the result, not an error.
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 
@@ -48,3 +50,9 @@ class Fault:
     def __str__(self) -> str:
         place = f"{self.where}: {self.field}" if self.field else self.where
         return f"{place}: {self.why}. {self.mend}"
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return "Did you mean 'x'?" for the nearest of `known`, or an empty string."""
+    near = difflib.get_close_matches(name, list(known), n=1)
+    return f"Did you mean {near[0]!r}?" if near else ""

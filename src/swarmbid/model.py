@@ -1,18 +1,22 @@
 """What a mission is: agents, tasks, and the rules that they must obey.
 
-Everything is frozen and checked when it is made, so that nothing downstream has to doubt it. Units
-are SI: metres, seconds, metres per second. Positions are local east-north-up.
+Everything is frozen and checked when it is made, so that nothing downstream has to doubt it: numbers
+are finite floats, counts are ints, names are text. Units are SI: metres, seconds, metres per second.
+Positions are local east-north-up; `Mission.origin` says where on Earth, if anywhere, that is.
 """
 
 from __future__ import annotations
 
 import math
-import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from swarmbid.errors import Fault, InputError
+from swarmbid.checks import Checker
+from swarmbid.errors import Fault
 
-ID_PATTERN = re.compile(r"[A-Za-z0-9._-]{1,64}")
+ALTITUDE_REFERENCES = ("rel_home", "amsl", "terrain_agl", "wgs84_ellipsoid")
+"""What an altitude is counted from: take-off point, mean sea level, ground below, WGS 84 ellipsoid."""
+
 Position = tuple[float, float, float]
 
 
@@ -48,17 +52,19 @@ class Agent:
     base: Position | None = None
 
     def __post_init__(self) -> None:
-        check = _Checker("agent", self.id)
-        check.position("position", self.position)
+        check = Checker("agent", self, self.id)
+        check.position("position")
+        check.name("type")
         if self.base is not None:
-            check.position("base", self.base)
-        check.number("speed", self.speed, low=0.0, low_open=True)
-        check.number("available_at", self.available_at, low=0.0)
-        check.number("fuel_per_metre", self.fuel_per_metre, low=0.0)
-        check.number("range", self.range, low=0.0, low_open=True, infinite=True)
-        check.number("endurance", self.endurance, low=0.0, low_open=True, infinite=True)
-        if self.bundle_limit is not None and self.bundle_limit < 1:
-            check.fault("bundle_limit", f"is {self.bundle_limit}", "Give 1 or more, or leave it out.")
+            check.position("base")
+        check.number("speed", above=0.0)
+        check.number("available_at", low=0.0)
+        check.number("fuel_per_metre", low=0.0)
+        check.number("range", above=0.0, infinite=True)
+        check.number("endurance", above=0.0, infinite=True)
+        check.names("equipment", frozenset)
+        if self.bundle_limit is not None:
+            check.count("bundle_limit", "Give 1 or more, or leave it out.")
         check.done()
 
 
@@ -97,28 +103,67 @@ class Task:
     revisit_width: float = 60.0
 
     def __post_init__(self) -> None:
-        check = _Checker("task", self.id)
-        check.position("position", self.position)
-        check.number("reward", self.reward, low=0.0, low_open=True)
-        check.number("start", self.start, low=0.0)
-        check.number("end", self.end, low=0.0, infinite=True)
-        check.number("duration", self.duration, low=0.0)
-        check.number("discount", self.discount, low=0.0)
+        check = Checker("task", self, self.id)
+        check.position("position")
+        check.name("type")
+        check.number("reward", above=0.0)
+        window = check.number("start", low=0.0)
+        window = check.number("end", low=0.0, infinite=True) and window
+        check.number("duration", low=0.0)
+        check.number("discount", low=0.0)
         if self.revisit_at is not None:
-            check.number("revisit_at", self.revisit_at, low=0.0)
-        check.number("revisit_width", self.revisit_width, low=0.0, low_open=True)
-        if self.end < self.start:
+            check.number("revisit_at", low=0.0)
+        check.number("revisit_width", above=0.0)
+        if window and self.end < self.start:
             check.fault(
-                "end", f"is {self.end} s, before start {self.start} s", "Let the window end after it starts."
+                "end",
+                f"is {self.end:g} s, before start {self.start:g} s",
+                "Let the window end after it starts.",
             )
-        if self.agents_required < 1:
-            check.fault("agents_required", f"is {self.agents_required}", "Give 1 or more.")
+        check.count("agents_required", "Give 1 or more.")
+        check.names("equipment", frozenset)
+        check.names("prerequisites", tuple)
+        check.done()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Origin:
+    """Where on Earth the local position (0, 0, 0) is, and what altitudes are counted from.
+
+    Parameters
+    ----------
+    latitude, longitude : degrees, WGS 84, north and east positive.
+    altitude : m above what `altitude_reference` names.
+    altitude_reference : one of `ALTITUDE_REFERENCES`. There is no default, for a wrong guess crashes
+        aircraft; one mission has one reference.
+    """
+
+    latitude: float
+    longitude: float
+    altitude: float
+    altitude_reference: str
+
+    def __post_init__(self) -> None:
+        check = Checker("origin", self)
+        placed = check.number("latitude", low=-90.0, high=90.0)
+        placed = check.number("longitude", low=-180.0, high=180.0) and placed
+        check.number("altitude")
+        if placed and abs(self.latitude) < 1e-6 and abs(self.longitude) < 1e-6:
+            check.fault(
+                "latitude", "and longitude are both 0, the mark of a missing fix", "Give the real place."
+            )
+        if self.altitude_reference not in ALTITUDE_REFERENCES:
+            check.fault(
+                "altitude_reference",
+                f"is {self.altitude_reference!r}",
+                f"Use one of {', '.join(ALTITUDE_REFERENCES)}.",
+            )
         check.done()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Mission:
-    """A team and its work.
+    """A team and its work. A team without work, and work without a team, are missions too.
 
     Parameters
     ----------
@@ -127,6 +172,7 @@ class Mission:
     distance_step : m; travelled distances are rounded down to a multiple of it (0 for exact), as
         some public benchmarks prescribe.
     name : for reports.
+    origin : where on Earth (0, 0, 0) is; None for a mission on paper.
     """
 
     agents: tuple[Agent, ...]
@@ -134,21 +180,21 @@ class Mission:
     compatible: dict[str, frozenset[str]] = field(default_factory=dict)
     distance_step: float = 0.0
     name: str = "mission"
+    origin: Origin | None = None
 
     def __post_init__(self) -> None:
-        faults = _duplicates(self) + _unknown_prerequisites(self)
-        cycle = prerequisite_cycle(self.tasks) if not faults else None
-        if cycle:
-            faults.append(
-                Fault(
-                    f"task {cycle[0]}",
-                    "prerequisites",
-                    "wait for each other in a circle: " + " -> ".join(cycle),
-                    "Remove one of them.",
-                )
-            )
-        if faults:
-            raise InputError(faults)
+        object.__setattr__(self, "agents", tuple(self.agents))
+        object.__setattr__(self, "tasks", tuple(self.tasks))
+        check = Checker("mission", self)
+        check.name("name")
+        check.number("distance_step", low=0.0)
+        check.table("compatible")
+        for finding in mission_findings(self.agents, self.tasks):
+            kind, index, name = finding.path[:3]
+            item = self.agents[int(index)] if kind == "agents" else self.tasks[int(index)]
+            where = f"{str(kind).removesuffix('s')} {item.id}"
+            check.faults.append(Fault(where, str(name), finding.why, finding.mend))
+        check.done()
 
     def can_do(self, agent: Agent, task: Task) -> bool:
         """Whether `agent` may take a seat of `task`, by type and, for a single seat, equipment."""
@@ -157,11 +203,71 @@ class Mission:
             return False
         return task.agents_required > 1 or task.equipment <= agent.equipment
 
+    def distance(self, a: Position, b: Position) -> float:
+        """Metres travelled from `a` to `b`, rounded down to a multiple of `distance_step`.
+
+        The same arithmetic as the compiled kernels, bit for bit. The 1e-9 keeps a length that is a
+        multiple already from falling one step short.
+        """
+        metres = distance(a, b)
+        if self.distance_step > 0.0:
+            metres = math.floor(metres / self.distance_step + 1e-9) * self.distance_step
+        return metres
+
 
 def distance(a: Position, b: Position) -> float:
     """Straight-line metres between two positions, the same bits on every machine."""
     dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
     return math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A fault between the parts of a mission, by place: ``("tasks", 3, "prerequisites", 0)``."""
+
+    path: tuple[str | int, ...]
+    why: str
+    mend: str
+
+
+def mission_findings(agents: Iterable[Agent], tasks: Iterable[Task]) -> list[Finding]:
+    """Everything wrong between agents and tasks that are each right: ids and prerequisites."""
+    tasks = tuple(tasks)
+    seen: set[str] = set()
+    findings = []
+    ids = {"agents": [agent.id for agent in agents], "tasks": [task.id for task in tasks]}
+    for kind in ids:
+        for index, item_id in enumerate(ids[kind]):
+            if item_id in seen:
+                findings.append(
+                    Finding(
+                        (kind, index, "id"), f"{item_id!r} is used twice", "Give each agent and task its own."
+                    )
+                )
+            seen.add(item_id)
+    known = {task.id for task in tasks}
+    for index, task in enumerate(tasks):
+        named: set[str] = set()
+        for place, need in enumerate(task.prerequisites):
+            path = ("tasks", index, "prerequisites", place)
+            if need == task.id:
+                findings.append(Finding(path, f"{need!r} is the task itself", "Remove it."))
+            elif need not in known:
+                findings.append(Finding(path, f"names {need!r}, which is no task", "Name a task."))
+            elif need in named:
+                findings.append(Finding(path, f"names {need!r} twice", "Remove one."))
+            named.add(need)
+    cycle = prerequisite_cycle(tasks)
+    if cycle is not None and len(cycle) > 2:
+        index = next(index for index, task in enumerate(tasks) if task.id == cycle[0])
+        findings.append(
+            Finding(
+                ("tasks", index, "prerequisites"),
+                "wait for each other in a circle: " + " -> ".join(cycle),
+                "Remove one of them.",
+            )
+        )
+    return findings
 
 
 def prerequisite_cycle(tasks: tuple[Task, ...]) -> list[str] | None:
@@ -185,61 +291,3 @@ def prerequisite_cycle(tasks: tuple[Task, ...]) -> list[str] | None:
             elif not finished[task_id]:
                 return [*trail[trail.index(task_id) :], task_id]
     return None
-
-
-def _duplicates(mission: Mission) -> list[Fault]:
-    seen: set[str] = set()
-    faults = []
-    for kind, items in (("agent", mission.agents), ("task", mission.tasks)):
-        for item in items:
-            if item.id in seen:
-                faults.append(
-                    Fault(f"{kind} {item.id}", "id", "is used twice", "Give every agent and task its own id.")
-                )
-            seen.add(item.id)
-    return faults
-
-
-def _unknown_prerequisites(mission: Mission) -> list[Fault]:
-    known = {task.id for task in mission.tasks}
-    return [
-        Fault(
-            f"task {task.id}",
-            "prerequisites",
-            f"names {need!r}, which is no task",
-            "Name a task of this mission.",
-        )
-        for task in mission.tasks
-        for need in task.prerequisites
-        if need not in known
-    ]
-
-
-class _Checker:
-    """Collects every fault of one object, then raises them together."""
-
-    def __init__(self, kind: str, name: str) -> None:
-        self.where = f"{kind} {name}"
-        self.faults: list[Fault] = []
-        if not ID_PATTERN.fullmatch(name):
-            self.fault("id", f"is {name!r}", "Use 1 to 64 letters, digits, dots, underscores or hyphens.")
-
-    def fault(self, name: str, why: str, mend: str) -> None:
-        self.faults.append(Fault(self.where, name, why, mend))
-
-    def number(
-        self, name: str, value: float, *, low: float, low_open: bool = False, infinite: bool = False
-    ) -> None:
-        if math.isnan(value) or (math.isinf(value) and not infinite):
-            self.fault(name, f"is {value}", "Give a finite number.")
-        elif value < low or (low_open and value == low):
-            bound = "more than" if low_open else "at least"
-            self.fault(name, f"is {value}", f"Give {bound} {low:g}.")
-
-    def position(self, name: str, value: Position) -> None:
-        if len(value) != 3 or not all(math.isfinite(x) for x in value):
-            self.fault(name, f"is {value}", "Give three finite numbers: east, north, up in m.")
-
-    def done(self) -> None:
-        if self.faults:
-            raise InputError(self.faults)

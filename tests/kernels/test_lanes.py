@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from swarmbid import arrays
 from swarmbid.kernels import lanes
 
 
@@ -35,11 +36,11 @@ def test_exponential_is_clamped_far_below_and_above():
 
 def test_distances_are_rounded_down_to_the_step():
     """A 1-1 diagonal is 1.414 m: 1.4 with a step of 0.1, 3-4-5 stays 5."""
-    tasks = np.zeros((lanes.NUM_TASK_ROWS, 2))
-    tasks[lanes.X] = [1.0, 3.0]
-    tasks[lanes.Y] = [1.0, 4.0]
+    tasks = np.zeros((arrays.NUM_TASK_ROWS, 2))
+    tasks[arrays.X] = [1.0, 3.0]
+    tasks[arrays.Y] = [1.0, 4.0]
     out = np.empty(2)
-    lanes.distance_lanes(0.0, 0.0, 0.0, tasks, 0, 2, 0.1, out)
+    lanes.distance_lanes(0.0, 0.0, 0.0, tasks, 2, 0.1, out)
     assert out.tolist() == [14 * 0.1, 50 * 0.1]
-    lanes.distance_lanes(0.0, 0.0, 0.0, tasks, 0, 2, 0.0, out)
+    lanes.distance_lanes(0.0, 0.0, 0.0, tasks, 2, 0.0, out)
     assert out.tolist() == [math.sqrt(2.0), 5.0]

@@ -5,8 +5,7 @@ LLVM turns it into vector instructions while every lane keeps the exact scalar a
 ``fastmath``, hence the same bits on every x86 target, on which ties between unlike machines depend.
 The exponential is a polynomial of our own, for the C library's differ between machines.
 
-Rows of the task table (``float64[NUM_TASK_ROWS, num_tasks]``, one column a task) and slots of the
-agent vector are named below; `swarmbid.arrays` fills them.
+Rows of the task table and slots of the agent vector are named and filled in `swarmbid.arrays`.
 """
 
 from __future__ import annotations
@@ -14,33 +13,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from swarmbid.arrays import X, Y, Z
+
 BLOCK = 256
 """Lanes worked on at once: the scratch rows of a block stay in the first-level cache."""
-
-# Rows of the task table.
-X, Y, Z = 0, 1, 2  # position, m
-END = 3  # latest start of service, s
-READY = 4  # earliest start of service an agent would choose, s
-OPEN = 5  # earliest start of service allowed, s
-DURATION = 6  # s
-REWARD = 7
-REFERENCE = 8  # s, where the decay counts from
-DECAY = 9  # 1/s
-PEAK = 10  # s
-INVERSE_WIDTH = 11  # 1/s, 0 for no peak
-FIXED = 12  # score units lost whenever this agent takes the task
-NUM_TASK_ROWS = 13
-
-# Slots of the agent vector.
-AGENT_X, AGENT_Y, AGENT_Z = 0, 1, 2
-SLOWNESS = 3  # s/m
-AVAILABLE = 4  # s
-COST_PER_METRE = 5
-RANGE = 6  # m
-LATEST_RETURN = 7  # s
-HAS_BASE, BASE_X, BASE_Y, BASE_Z = 8, 9, 10, 11
-DISTANCE_STEP = 12  # m, 0 for exact distances
-NUM_AGENT_SLOTS = 13
 
 _LOG2E = 1.4426950408889634
 _LN2_HIGH = 6.93147180369123816490e-01
@@ -84,11 +60,9 @@ def exp_lanes(exponent, bits, scale, count):
 
 
 @njit(cache=True, error_model="numpy")
-def distance_lanes(x, y, z, tasks, first, count, step, out):
-    """Distances in m from one point to a block of tasks, rounded down to `step` if it is not 0."""
-    xs = tasks[X, first : first + count]
-    ys = tasks[Y, first : first + count]
-    zs = tasks[Z, first : first + count]
+def distance_lanes(x, y, z, tasks, count, step, out):
+    """Distances in m from one point to the first tasks of a table, rounded down to `step` if not 0."""
+    xs, ys, zs = tasks[X], tasks[Y], tasks[Z]
     for j in range(count):
         dx = xs[j] - x
         dy = ys[j] - y

@@ -1,0 +1,1 @@
+"""One algorithm per file, its sources in its docstring; the file's name is the algorithm's name."""

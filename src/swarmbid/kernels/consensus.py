@@ -1,0 +1,217 @@
+"""Phase 2: one message against one agent's beliefs, and what the agent's new bundle changes in them.
+
+The rules themselves are data (`swarmbid.algorithms.cbba.DECISION_RULES`), packed to a table
+``int8[sender believes, receiver believes, facts]`` of actions; the names below are its axes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from swarmbid.arrays import NO_AGENT
+from swarmbid.kernels.bundle import BID, BUNDLE, outbids
+
+# What the sender believes about a task's winner, and what the receiver believes.
+SENDER, RECEIVER, OTHER, NOBODY, SAME = 0, 1, 2, 3, 4  # SAME: a third agent, the sender's own belief
+# Facts, as bits.
+BETTER = 1  # the sender's bid outbids the receiver's
+NEWER_THEIRS = 2  # the sender has newer news of the agent that the sender believes in
+NEWER_MINE = 4  # the sender has newer news of the agent that the receiver believes in
+OLDER_THEIRS = 8  # the receiver has newer news of the agent that the sender believes in
+NUM_FACTS = 16
+# Actions.
+LEAVE, UPDATE, RESET = 0, 1, 2
+
+# Flags of a task in the beliefs.
+TO_SEND = 1  # changed, or in dispute, since it was last sent
+TO_WEIGH = 2  # its bid to beat changed since the bundle was built
+NOT_LISTED = -1
+"""Stamp of an agent that a message says nothing about."""
+
+_GOLDEN = np.uint64(0x9E3779B97F4A7C15)
+_MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
+_MIX_2 = np.uint64(0x94D049BB133111EB)
+
+
+@njit(cache=True)
+def _scramble(x):
+    """The finaliser of SplitMix64: every input bit moves every output bit."""
+    x = (x ^ (x >> np.uint64(30))) * _MIX_1
+    x = (x ^ (x >> np.uint64(27))) * _MIX_2
+    return x ^ (x >> np.uint64(31))
+
+
+@njit(cache=True)
+def belief_hash(task_hash, winner_hash, bid_bits):
+    """Hash of one belief: this agent wins this task with this bid."""
+    return _scramble(task_hash + _scramble(winner_hash + _GOLDEN * bid_bits))
+
+
+@njit(cache=True)
+def digest_of(task_hash, agent_hash, winner, bid_bits):
+    """Sum of the hashes of all beliefs: the same set of beliefs gives the same digest."""
+    total = np.uint64(0)
+    for j in range(task_hash.shape[0]):
+        w = winner[j]
+        h = agent_hash[w] if w != NO_AGENT else np.uint64(0)
+        total += belief_hash(task_hash[j], h, bid_bits[j])
+    return total
+
+
+@njit(cache=True)
+def believe(j, new_winner, new_bid, winner, bid, bid_bits, task_hash, agent_hash, digest):
+    """Set one belief and keep the digest in step."""
+    old = agent_hash[winner[j]] if winner[j] != NO_AGENT else np.uint64(0)
+    digest[0] -= belief_hash(task_hash[j], old, bid_bits[j])
+    winner[j] = new_winner
+    bid[j] = new_bid
+    new = agent_hash[new_winner] if new_winner != NO_AGENT else np.uint64(0)
+    digest[0] += belief_hash(task_hash[j], new, bid_bits[j])
+
+
+@njit(cache=True)
+def decide(rules, me, sender, their_winner, their_bid, my_winner, my_bid, their_heard, my_heard):
+    """Return the action for one task.
+
+    Parameters
+    ----------
+    their_heard, my_heard : int64[num_agents], stamps s_k and s_i.
+    """
+    if their_winner == sender:
+        says = SENDER
+    elif their_winner == me:
+        says = RECEIVER
+    elif their_winner == NO_AGENT:
+        says = NOBODY
+    else:
+        says = OTHER
+    if my_winner == me:
+        thinks = RECEIVER
+    elif my_winner == sender:
+        thinks = SENDER
+    elif my_winner == NO_AGENT:
+        thinks = NOBODY
+    elif my_winner == their_winner:
+        thinks = SAME
+    else:
+        thinks = OTHER
+    facts = 0
+    if their_winner != NO_AGENT:
+        if outbids(their_bid, their_winner, my_bid, my_winner):
+            facts |= BETTER
+        theirs = their_heard[their_winner]
+        if theirs > my_heard[their_winner]:
+            facts |= NEWER_THEIRS
+        elif theirs != NOT_LISTED and theirs < my_heard[their_winner]:
+            facts |= OLDER_THEIRS
+    if my_winner != NO_AGENT and their_heard[my_winner] > my_heard[my_winner]:
+        facts |= NEWER_MINE
+    return rules[says, thinks, facts]
+
+
+@njit(cache=True)
+def resolve(
+    rules, me, sender, full, winner, bid, bid_bits, heard, flags, task_hash, agent_hash, digest,
+    rows, their_winners, their_bids, their_heard,
+):  # fmt: skip
+    """Apply one message to the beliefs: every listed task by the table, then the stamps.
+
+    Stamps are raised after the rows are applied; before, "newer" would never be true. A task on which
+    the two still differ afterwards is flagged to be sent again: the sender has to hear it.
+
+    Parameters
+    ----------
+    rules : int8[5, 5, NUM_FACTS]. me, sender : agent rows.
+    full : whether tasks that are not listed have no winner for the sender (else they are unchanged).
+    winner, bid : int32, float64[num_tasks], beliefs (z_i, y_i), in and out. bid_bits : bid as uint64.
+    heard : int64[num_agents], stamps (s_i), in and out.
+    flags : uint8[num_tasks], in and out. digest : uint64[1], in and out.
+    rows, their_winners, their_bids : int32[n], int32[n], float64[n], what the message lists.
+    their_heard : int64[num_agents], the sender's stamps, NOT_LISTED where it says none.
+
+    Returns
+    -------
+    Number of beliefs that changed.
+    """
+    changes = 0
+    for i in range(rows.shape[0]):
+        j = rows[i]
+        if winner[j] == their_winners[i] and bid[j] == their_bids[i]:
+            continue  # of one mind: no row of any table changes that
+        action = decide(
+            rules, me, sender, their_winners[i], their_bids[i], winner[j], bid[j], their_heard, heard
+        )
+        if action == UPDATE:
+            believe(j, their_winners[i], their_bids[i], winner, bid, bid_bits, task_hash, agent_hash, digest)
+            flags[j] |= TO_SEND | TO_WEIGH
+            changes += 1
+            continue
+        if action == RESET and winner[j] != NO_AGENT:
+            believe(j, NO_AGENT, 0.0, winner, bid, bid_bits, task_hash, agent_hash, digest)
+            flags[j] |= TO_SEND | TO_WEIGH
+            changes += 1
+        flags[j] |= TO_SEND
+    if full:
+        listed = np.zeros(winner.shape[0], np.bool_)
+        for i in range(rows.shape[0]):
+            listed[rows[i]] = True
+        for j in range(winner.shape[0]):
+            if listed[j] or winner[j] == NO_AGENT:
+                continue
+            action = decide(rules, me, sender, NO_AGENT, 0.0, winner[j], bid[j], their_heard, heard)
+            if action != LEAVE:
+                believe(j, NO_AGENT, 0.0, winner, bid, bid_bits, task_hash, agent_hash, digest)
+                flags[j] |= TO_SEND | TO_WEIGH
+                changes += 1
+            else:
+                flags[j] |= TO_SEND
+    for m in range(heard.shape[0]):
+        if m != me and their_heard[m] > heard[m]:
+            heard[m] = their_heard[m]
+    return changes
+
+
+@njit(cache=True)
+def any_flags(flags):
+    """All flags of all tasks, joined."""
+    joined = np.uint8(0)
+    for j in range(flags.shape[0]):
+        joined |= flags[j]
+    return joined
+
+
+@njit(cache=True)
+def claim(me, before, order, marks, length, winner, bid, bid_bits, flags, task_hash, agent_hash, digest):
+    """Make the beliefs agree with the agent's new bundle.
+
+    What it held and does not take again has no winner now; what it takes is its own at its bid.
+
+    Parameters
+    ----------
+    before : int64[n], the old bundle; order, marks, length : the new one (`swarmbid.kernels.bundle`).
+
+    Returns
+    -------
+    Number of beliefs that changed.
+    """
+    changes = 0
+    for i in range(before.shape[0]):
+        j = before[i]
+        if winner[j] != me:
+            continue
+        held = False
+        for k in range(length):
+            if order[BUNDLE, k] == j:
+                held = True
+        if not held:
+            believe(j, NO_AGENT, 0.0, winner, bid, bid_bits, task_hash, agent_hash, digest)
+            flags[j] |= TO_SEND
+            changes += 1
+    for k in range(length):
+        j = order[BUNDLE, k]
+        if winner[j] != me or bid[j] != marks[BID, k]:
+            believe(j, me, marks[BID, k], winner, bid, bid_bits, task_hash, agent_hash, digest)
+            flags[j] |= TO_SEND
+            changes += 1
+    return changes

@@ -1,0 +1,69 @@
+"""Phase 1 compiled again with a user's own score in place of the coefficients.
+
+The kernel source is the same: `build_bundle`, `path_state` and `evaluate` are rebuilt from their code
+with other functions under the names `visit_values`, `later_values` and `leg_changes`. Nothing of it is
+cached on disk, for Numba would keep it under the name of the original.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache
+from types import FunctionType
+from typing import Any
+
+from numba import njit
+
+from swarmbid.arrays import DECAY, DURATION, END, INVERSE_WIDTH, OPEN, PEAK, REWARD, VisitRecord
+from swarmbid.kernels import bundle, insertion
+
+
+@lru_cache(maxsize=16)
+def phase_with(function: Callable[[VisitRecord], float]) -> Callable[..., Any]:
+    """Return `build_bundle` for the score that `function` gives (about two seconds, once)."""
+    score = njit(function)
+
+    @njit
+    def visit(tasks, task, start, leg, cost):
+        return score(
+            VisitRecord(
+                tasks[REWARD, task],
+                tasks[DECAY, task],
+                tasks[OPEN, task],
+                tasks[END, task],
+                tasks[DURATION, task],
+                tasks[PEAK, task],
+                tasks[INVERSE_WIDTH, task],
+                start,
+                leg,
+                cost,
+            )
+        )
+
+    @njit
+    def visit_values(candidates, count, time, leg, cost, power, bits, scale, out):
+        for j in range(count):
+            out[j] = visit(candidates, j, time[j], leg[j], cost)
+
+    @njit
+    def later_values(tasks, task, count, time, leg, cost, power, bits, scale, out):
+        for j in range(count):
+            out[j] = visit(tasks, task, time[j], leg[j], cost)
+
+    @njit
+    def leg_changes(tasks, task, start, old_leg, count, leg, cost, out):
+        old = visit(tasks, task, start, old_leg, cost)
+        for j in range(count):
+            out[j] = visit(tasks, task, start, leg[j], cost) - old
+
+    parts = {"visit_values": visit_values, "later_values": later_values, "leg_changes": leg_changes}
+    path_state = _rebuilt(insertion.path_state, parts)
+    evaluate = _rebuilt(insertion.evaluate, parts)
+    weigh = _rebuilt(bundle.weigh, {"evaluate": evaluate})
+    return _rebuilt(bundle.build_bundle, {"path_state": path_state, "evaluate": evaluate, "weigh": weigh})
+
+
+def _rebuilt(kernel: Any, parts: dict[str, Any]) -> Callable[..., Any]:
+    plain = getattr(kernel, "py_func", kernel)  # with the compiler off a kernel is its own source
+    function = FunctionType(plain.__code__, {**plain.__globals__, **parts}, plain.__name__)
+    return njit(error_model="numpy")(function)

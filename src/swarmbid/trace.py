@@ -1,0 +1,443 @@
+"""The record of a run: one JSON object a line, written by every driver, read by everything else.
+
+The first line is the `Header` (the whole mission, the options, the seed), the last the `Result`;
+between them stands what happened, in order. Each record is a frozen struct below, so the file's
+schema is written once: `trace_schema` prints it.
+
+The format is version 1 and grows by appending only: new kinds of record and new fields with a
+default. A reader keeps kinds that it does not know (`Other`) and skips fields that it does not know.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from types import TracebackType
+from typing import IO, TYPE_CHECKING, Annotated, Any, Literal, TypeVar
+
+import msgspec
+from msgspec import Meta, Struct
+
+from swarmbid.errors import Fault, InputError
+
+if TYPE_CHECKING:
+    from swarmbid.model import Mission
+
+TRACE_VERSION = 1
+PARTIAL_SUFFIX = ".part"
+_BUFFER_BYTES = 1 << 20
+
+Kind = TypeVar("Kind", bound="Struct")
+Time = Annotated[float, Meta(description="s since the run began; in rounds mode the number of the round")]
+AgentId = Annotated[str, Meta(description="id of the agent that the record is about")]
+TaskId = Annotated[str, Meta(description="id of the task")]
+
+
+class Header(Struct, frozen=True, kw_only=True, tag_field="kind", tag="trace"):
+    """First line: everything that is needed to run it again."""
+
+    version: Annotated[int, Meta(description="version of the format, 1")] = TRACE_VERSION
+    swarmbid: Annotated[str, Meta(description="version of the program that wrote it")]
+    mission: Annotated[dict[str, Any], Meta(description="the mission, as in a mission file, local metres")]
+    algorithm: str
+    options: Annotated[dict[str, Any], Meta(description="options of the algorithm")] = {}
+    score: Annotated[dict[str, Any], Meta(description="name of the score and its options")] = {}
+    network: Annotated[dict[str, Any], Meta(description="graph, delay, loss and the like")] = {}
+    seed: int = 0
+    mode: Literal["rounds", "asynchronous"] = "rounds"
+
+
+class Sent(Struct, frozen=True, kw_only=True, tag_field="kind", tag="sent"):
+    """An agent broadcast what changed (or all it believes)."""
+
+    t: Time
+    agent: AgentId
+    sequence: Annotated[int, Meta(description="the sender's own counter")]
+    entries: Annotated[int, Meta(description="beliefs carried")]
+    bytes: Annotated[int, Meta(description="size on the wire")]
+    full: Annotated[bool, Meta(description="whole state rather than changes")] = False
+    receivers: Annotated[int, Meta(description="neighbours in reach when it was sent")] = 0
+    lost: Annotated[int, Meta(description="of them, how many the network lost it for")] = 0
+
+
+class Dropped(Struct, frozen=True, kw_only=True, tag_field="kind", tag="dropped"):
+    """An agent refused a message; nothing changed for it."""
+
+    t: Time
+    agent: Annotated[str, Meta(description="id of the receiver")]
+    sender: str | None = None
+    reason: Annotated[str, Meta(description="gap, duplicate, stale, malformed ...")]
+
+
+class Taken(Struct, frozen=True, kw_only=True, tag_field="kind", tag="taken"):
+    """An agent added a task to its bundle and bids for it."""
+
+    t: Time
+    agent: AgentId
+    task: TaskId
+    bid: Annotated[float, Meta(description="score units")]
+    position: Annotated[int, Meta(description="place in its path, 0 for first")]
+    start: Annotated[float, Meta(description="start of service meant, s")]
+
+
+class Outbid(Struct, frozen=True, kw_only=True, tag_field="kind", tag="outbid"):
+    """An agent learnt that a task it held is another's."""
+
+    t: Time
+    agent: Annotated[str, Meta(description="id of the agent that lost the task")]
+    task: TaskId
+    bid: Annotated[float, Meta(description="what it had bid, score units")]
+    by: Annotated[str | None, Meta(description="id of the winner; null if nobody holds it")] = None
+    by_bid: Annotated[float | None, Meta(description="the winner's bid, score units")] = None
+
+
+class Released(Struct, frozen=True, kw_only=True, tag_field="kind", tag="released"):
+    """An agent gave up a task that was still its own."""
+
+    t: Time
+    agent: AgentId
+    task: TaskId
+    because: Annotated[str | None, Meta(description="the earlier task of its bundle that it had lost")] = None
+
+
+class Agreed(Struct, frozen=True, kw_only=True, tag_field="kind", tag="agreed"):
+    """An agent sees everybody's beliefs equal to its own."""
+
+    t: Time
+    agent: AgentId
+
+
+class Doubted(Struct, frozen=True, kw_only=True, tag_field="kind", tag="doubted"):
+    """An agent no longer sees everybody's beliefs equal to its own."""
+
+    t: Time
+    agent: AgentId
+
+
+class Result(Struct, frozen=True, kw_only=True, tag_field="kind", tag="result"):
+    """Last line: how the run ended and the plan that came of it."""
+
+    t: Time
+    status: Literal["converged", "not_converged"]
+    reason: str = ""
+    disagreements: Annotated[list[Any], Meta(description="who believes what about which task")] = []
+    rounds: Annotated[int | None, Meta(description="rounds until all agreed")] = None
+    last_bid_round: Annotated[int | None, Meta(description="round of the last bid")] = None
+    declared_round: Annotated[int | None, Meta(description="round in which all knew it")] = None
+    plan: Annotated[dict[str, Any], Meta(description="who does what and when")] = {}
+
+
+@dataclass(frozen=True)
+class Other:
+    """A record of a kind that this version does not know, kept as it came."""
+
+    kind: str
+    t: float
+    fields: dict[str, Any]
+
+
+Known = Sent | Dropped | Taken | Outbid | Released | Agreed | Doubted | Result
+Record = Known | Other
+RECORD_KINDS: tuple[type[Struct], ...] = (
+    Header,
+    Sent,
+    Dropped,
+    Taken,
+    Outbid,
+    Released,
+    Agreed,
+    Doubted,
+    Result,
+)
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A trace in memory.
+
+    Parameters
+    ----------
+    source : file that it was read from, for messages.
+    header : the first line.
+    records : everything after it, in order.
+    """
+
+    source: str
+    header: Header
+    records: tuple[Record, ...]
+
+    @property
+    def result(self) -> Result | None:
+        """How the run ended; None if it was stopped before."""
+        for record in reversed(self.records):
+            if isinstance(record, Result):
+                return record
+        return None
+
+    def finished(self) -> Result:
+        """Return `result`; when you cannot do without, for it raises InputError if there is none."""
+        result = self.result
+        if result is None:
+            raise InputError(
+                [
+                    Fault(
+                        self.source,
+                        "",
+                        "has no result record: the run was stopped before its end",
+                        "Run it again to its end.",
+                    )
+                ]
+            )
+        return result
+
+    def of(self, kind: type[Kind]) -> Iterator[Kind]:
+        """Yield the records of one kind, in order."""
+        for record in self.records:
+            if isinstance(record, kind):
+                yield record
+
+    def mission(self) -> Mission:
+        """Return the mission that the header carries."""
+        from swarmbid.missionfile import mission_from_dict
+
+        return mission_from_dict(self.header.mission, where=f"{self.source}: mission")
+
+
+class TraceWriter:
+    """Writes a trace; use it as a context manager, hand it the `Header` first.
+
+    To a path, the lines go to a file beside it whose name ends in ``.part``, which takes the name of
+    `target` when the run is over: an older trace is never half overwritten, and a run that is killed
+    leaves what it had written, readable with ``read_trace(path, partial=True)``.
+
+    Parameters
+    ----------
+    target : path, or an open text or binary file, which stays open.
+
+    Examples
+    --------
+    >>> import io
+    >>> file = io.StringIO()
+    >>> with TraceWriter(file) as trace:
+    ...     trace.write(Agreed(t=3.0, agent="uav1"))
+    >>> file.getvalue()
+    '{"kind":"agreed","t":3.0,"agent":"uav1"}\\n'
+    """
+
+    def __init__(self, target: str | PathLike[str] | IO[str] | IO[bytes]) -> None:
+        self._encoder = msgspec.json.Encoder(enc_hook=_plain_number)
+        self._lines: list[bytes] = []
+        self._size = 0
+        self._count = 0
+        self._final: Path | None = None
+        self._partial: Path | None = None
+        self._file: Any
+        if isinstance(target, str | PathLike):
+            path = Path(target)
+            # Pipes and devices have nothing to be renamed onto.
+            if path.exists() and not path.is_file():
+                self._partial = path
+            else:
+                self._final = path.resolve()
+                self._partial = self._final.with_name(self._final.name + PARTIAL_SUFFIX)
+            try:
+                self._file = self._partial.open("wb", buffering=0)
+            except OSError as error:
+                raise InputError(
+                    [
+                        Fault(
+                            str(target),
+                            "",
+                            f"cannot be written: {error.strerror or error}",
+                            "Give a path in a directory that exists and that you may write to.",
+                        )
+                    ]
+                ) from error
+        else:
+            self._file = target
+        self._text = isinstance(self._file, io.TextIOBase)
+
+    def write(self, record: Header | Known) -> None:
+        """Append one record."""
+        self._append(self._encoder.encode(record))
+
+    def write_fields(self, kind: str, t: float, **fields: Any) -> None:
+        """Append a record of a kind of your own; readers that do not know it keep it."""
+        self._append(self._encoder.encode({"kind": kind, "t": t, **fields}))
+
+    def flush(self) -> None:
+        """Hand what is buffered to the file."""
+        if not self._lines:
+            return
+        block = b"".join(self._lines)
+        self._lines.clear()
+        self._size = 0
+        if self._text:
+            self._file.write(block.decode())
+        else:
+            # An unbuffered file may take less than it was given.
+            view = memoryview(block)
+            while view:
+                written = self._file.write(view)
+                view = view[len(view) if written is None else written :]
+
+    def close(self) -> None:
+        """Flush, and give the file its name. Calling it twice is harmless."""
+        self._end(keep_name=True)
+
+    def __enter__(self) -> TraceWriter:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._end(keep_name=error is None)
+
+    def _append(self, line: bytes) -> None:
+        self._lines.append(line)
+        self._lines.append(b"\n")
+        self._size += len(line) + 1
+        self._count += 1
+        if self._size >= _BUFFER_BYTES:
+            self.flush()
+
+    def _end(self, *, keep_name: bool) -> None:
+        if self._file is None:
+            return
+        self.flush()
+        if self._partial is None:
+            self._file.flush()
+        else:
+            self._file.close()
+        if self._final is not None and self._partial is not None:
+            if keep_name:
+                self._partial.replace(self._final)
+            elif self._count == 0:
+                self._partial.unlink()
+        self._file = None
+
+
+def read_trace(path: str | PathLike[str], *, partial: bool = False) -> Trace:
+    """Read a trace.
+
+    Parameters
+    ----------
+    path : the file.
+    partial : accept a file whose last line is cut, as a killed run leaves it; the cut line is left out.
+
+    Raises
+    ------
+    InputError
+        With file and line, if it cannot be read, is empty, no trace, of another version, or broken.
+    """
+    source = str(path)
+    known = msgspec.json.Decoder(Known)
+    records: list[Record] = []
+    header: Header | None = None
+    now = 0.0
+    try:
+        with Path(path).open("rb") as file:
+            for number, line in enumerate(file, start=1):
+                where = f"{source}:{number}"
+                if header is None:
+                    header = _read_header(line, where)
+                    continue
+                if not line.strip():
+                    continue
+                try:
+                    record: Record = known.decode(line)
+                except msgspec.MsgspecError as error:
+                    cut = not line.endswith(b"\n")
+                    if cut and partial:
+                        break
+                    record = _read_other(line, now, where, str(error), cut)
+                now = record.t
+                records.append(record)
+    except OSError as error:
+        raise _fault(
+            source, f"cannot be read: {error.strerror or error}", "Give the path of a trace file."
+        ) from error
+    if header is None:
+        raise _fault(f"{source}:1", "is empty", "Give a trace, as `swarmbid simulate --trace` writes it.")
+    return Trace(source, header, tuple(records))
+
+
+def trace_schema() -> dict[str, Any]:
+    """Return the JSON Schema of one line of a trace."""
+    schemas, components = msgspec.json.schema_components(
+        RECORD_KINDS, ref_template="#/$defs/{name}"
+    )  # one reference for each kind, and their definitions
+    for definition in components.values():
+        definition.get("properties", {}).get("kind", {})["description"] = "kind of record"
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": f"One line of a swarmbid trace, version {TRACE_VERSION}",
+        "anyOf": list(schemas),
+        "$defs": components,
+    }
+
+
+def _read_header(line: bytes, where: str) -> Header:
+    no_trace = "is no swarmbid trace"
+    mend = "Give a trace, as `swarmbid simulate --trace` writes it."
+    try:
+        first = msgspec.json.decode(line)
+    except msgspec.MsgspecError as error:
+        raise _fault(where, f"{no_trace}: its first line is no JSON object ({error})", mend) from error
+    if not isinstance(first, dict) or first.get("kind") != "trace":
+        raise _fault(where, f'{no_trace}: its first line is not of kind "trace"', mend)
+    version = first.get("version")
+    if version != TRACE_VERSION:
+        raise _fault(
+            where,
+            f"is a trace of version {version!r}; this program reads version {TRACE_VERSION}",
+            "Read it with the version of swarmbid that wrote it, or run it again.",
+        )
+    try:
+        return msgspec.convert(first, Header)
+    except msgspec.ValidationError as error:
+        raise _fault(where, f"is broken: {error}", "Run it again.") from error
+
+
+def _read_other(line: bytes, now: float, where: str, problem: str, cut: bool) -> Other:
+    """Keep a record of an unknown kind; raise for a broken line."""
+    try:
+        fields = msgspec.json.decode(line)
+    except msgspec.MsgspecError:
+        if cut:
+            raise _fault(
+                where,
+                "ends in the middle of a record: the run was stopped or the file was cut",
+                "Run it again, or read the whole lines with read_trace(path, partial=True).",
+            ) from None
+        raise _fault(where, f"is broken: {problem}", "Run it again.") from None
+    kind = fields.get("kind") if isinstance(fields, dict) else None
+    if not isinstance(kind, str) or kind in _KNOWN_KINDS:
+        raise _fault(where, f"is broken: {problem}", "Run it again.")
+    t = fields.get("t", now)
+    return Other(kind, float(t) if isinstance(t, int | float) else now, fields)
+
+
+_KNOWN_KINDS = frozenset(str(kind.__struct_config__.tag) for kind in RECORD_KINDS)
+
+
+def _plain_number(value: Any) -> Any:
+    """Let numpy's numbers and arrays pass as plain ones."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise TypeError(f"a trace cannot hold {type(value).__name__}")
+
+
+def _fault(where: str, why: str, mend: str) -> InputError:
+    return InputError([Fault(where, "", why, mend)])
+
+EVENT_RECORDS: dict[str, type[Any]] = {
+    str(kind.__struct_config__.tag): kind for kind in RECORD_KINDS if kind not in (Header, Sent, Result)
+}
+"""Kind of a negotiator's event -> its record, whose fields are the event's, with time and agent."""
