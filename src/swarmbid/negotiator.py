@@ -56,13 +56,13 @@ class TaskOutbid(Event):
 
     Parameters
     ----------
-    bid : what it had bid. by : the winner now, None if nobody is known. by_bid : the winner's bid.
+    bid : what it had bid. by : the winner now. by_bid : the winner's bid.
     """
 
     kind = "outbid"
     task: str
     bid: float
-    by: str | None
+    by: str
     by_bid: float
 
 

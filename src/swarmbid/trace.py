@@ -90,8 +90,8 @@ class Outbid(Struct, frozen=True, kw_only=True, tag_field="kind", tag="outbid"):
     agent: Annotated[str, Meta(description="id of the agent that lost the task")]
     task: TaskId
     bid: Annotated[float, Meta(description="what it had bid, score units")]
-    by: Annotated[str | None, Meta(description="id of the winner; null if nobody holds it")] = None
-    by_bid: Annotated[float | None, Meta(description="the winner's bid, score units")] = None
+    by: Annotated[str, Meta(description="id of the winner")]
+    by_bid: Annotated[float, Meta(description="the winner's bid, score units")]
 
 
 class Released(Struct, frozen=True, kw_only=True, tag_field="kind", tag="released"):
@@ -436,6 +436,7 @@ def _plain_number(value: Any) -> Any:
 
 def _fault(where: str, why: str, mend: str) -> InputError:
     return InputError([Fault(where, "", why, mend)])
+
 
 EVENT_RECORDS: dict[str, type[Any]] = {
     str(kind.__struct_config__.tag): kind for kind in RECORD_KINDS if kind not in (Header, Sent, Result)

@@ -78,6 +78,40 @@ def explain_unserved(
     )
 
 
+@dataclass(frozen=True)
+class Offer:
+    """What an agent could still gain by adding a task to its final path.
+
+    Parameters
+    ----------
+    agent : id.
+    gain : score units at the best place; None if it can add the task nowhere.
+    position : of that place in the path, from 0; None likewise.
+    obstacle : a key of `REASONS` if it can add the task nowhere, else empty. detail : the same in words.
+    """
+
+    agent: str
+    gain: float | None
+    position: int | None
+    obstacle: str
+    detail: str
+
+
+def offers(
+    mission: Mission, paths: Mapping[str, Path], score: Score, task: Task, *, algorithm: str, insertion: str
+) -> list[Offer]:
+    """Return what each agent that does not do `task` could gain by it, in order of agent id.
+
+    Parameters
+    ----------
+    paths, score, algorithm, insertion : as for `explain_unserved`.
+    """
+    judge = _Judge(mission, paths, score, algorithm, insertion)
+    judge.steps = MOST_STEPS * 10  # one task only, so every agent can be asked
+    holders = {agent for agent, path in judge.paths.items() if any(step.id == task.id for step, _ in path)}
+    return [judge.offer(agent, task) for agent in judge.agents if agent.id not in holders]
+
+
 class _OutOfSteps(Exception):
     """There are more places to try than `MOST_STEPS`."""
 
@@ -137,6 +171,34 @@ class _Judge:
         if task.prerequisites:
             return "prerequisite", self.prerequisite_detail(task)
         return self.judge_offers(task, [agent for agent in capable if self.reaches(agent, task)])
+
+    def offer(self, agent: Agent, task: Task) -> Offer:
+        """What `agent` could gain by adding `task` now, or what is in the way."""
+
+        def cannot(obstacle: str, detail: str) -> Offer:
+            return Offer(agent.id, None, None, obstacle, detail)
+
+        if task.type not in self.mission.compatible.get(agent.type, {task.type}):
+            return cannot("no_capable_agent", f"its type, {agent.type}, does no {task.type} tasks")
+        if not self.mission.can_do(agent, task):
+            missing = ", ".join(sorted(task.equipment - agent.equipment))
+            return cannot("no_capable_agent", f"it carries no {missing}")
+        late = self.lateness(agent, task)
+        if late > 0.0:
+            return cannot("window", f"it would be {late:.6g} s late even doing nothing else")
+        if not self.reaches(agent, task):
+            return cannot("range", "it cannot fly there and back even doing nothing else")
+        if agent.id in self.full:
+            return cannot("no_room", f"its bundle is full with {len(self.paths[agent.id])} tasks")
+        path = self.paths[agent.id]
+        best, place = -math.inf, -1
+        for trial in self.insertions(agent, path, task):
+            gain = self.path_worth(agent, trial) - self.worths[agent.id]
+            if gain > best:
+                best, place = gain, next(k for k, (step, _) in enumerate(trial) if step.id == task.id)
+        if place < 0:
+            return cannot("no_room", "it fits at no place of its path (windows, range or endurance)")
+        return Offer(agent.id, best, place, "", f"as stop {place + 1} it would gain {best:.6g}")
 
     def spend(self, steps: int) -> None:
         self.steps -= steps

@@ -10,7 +10,6 @@ import pytest
 
 from naive import outbids
 from naive_consensus import decide, row_of
-from swarmbid.algorithms.cbaa import CBAA
 from swarmbid.algorithms.cbba import CBBA, DECISION_RULES, packed
 from swarmbid.arrays import NO_AGENT
 from swarmbid.kernels import consensus
@@ -113,15 +112,6 @@ def test_every_clause_of_a_row_counts(row: int, line: int):
     case = list(DECISION_RULES)[row - 1]
     fewer = tuple(clause for k, clause in enumerate(DECISION_RULES[case]) if k != line)
     assert disagreements(packed({**DECISION_RULES, case: fewer})) == {row}
-
-
-def test_cbaa_keeps_the_larger_bid_whatever_else_is_believed():
-    for seating, theirs, mine, bids, stamps in every_case():
-        bid, my_bid = (bids[0] if theirs else 0.0), (bids[1] if mine else 0.0)
-        row = {role: str(number) for number, role in enumerate(seating)} | {None: None}
-        better = outbids(bid, row[theirs], my_bid, row[mine])
-        expected = "update" if better else "leave"
-        assert kernel_says(CBAA.DECISIONS, seating, theirs, mine, bids, stamps) == expected
 
 
 class Table:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.generators import random_mission
 
+from generators import random_mission
 from swarmbid.arrays import NO_AGENT, MissionArrays
 from swarmbid.kernels import wire
 from swarmbid.kernels.consensus import NOT_LISTED, TO_SEND, TO_WEIGH

@@ -12,7 +12,6 @@ advances, until it has seen every live agent hold its digest; then it is silent 
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from typing import Any, ClassVar
 
@@ -20,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmbid.algorithms._agreement import Agreement
-from swarmbid.algorithms._beliefs import BeliefTable, translated
+from swarmbid.algorithms._beliefs import DONE_BID, BeliefTable, translated
 from swarmbid.algorithms._bundle import RULES, Bundle
 from swarmbid.arrays import NO_AGENT, IntArray, MissionArrays, StampArray
 from swarmbid.errors import Fault, InputError
@@ -40,8 +39,8 @@ from swarmbid.negotiator import (
 )
 from swarmbid.scores import Score, make_score
 
-STARTED_BID = sys.float_info.max
-"""Bid on a task that has been started: finite, and nobody outbids it."""
+STARTED_BID = DONE_BID / 2.0
+"""Bid on a task that has been started: nobody outbids it, but it is open again if its agent is lost."""
 NO_ROWS: IntArray = np.zeros(0, np.int32)
 NO_STAMPS: StampArray = np.zeros(0, np.int64)
 FULL_AFTER_ASKED = 30
@@ -152,7 +151,8 @@ class ConsensusAuction(Negotiator):
         """How many tasks of the bundle, counted from its first, stay without question."""
         if self._rebuild:
             return 0
-        still = self._beliefs.winner[self._bundle.tasks] == self._me
+        tasks = self._bundle.tasks
+        still = (self._beliefs.winner[tasks] == self._me) & ~self._has_started(tasks)
         return int(np.argmin(still)) if not still.all() else self._bundle.length
 
     # --- the door in
@@ -294,8 +294,10 @@ class ConsensusAuction(Negotiator):
         changed, build = bundle.to_weigh(beliefs.flags, TO_WEIGH, beliefs.bid, beliefs.winner)
         if not build and not self._must_build:
             return
-        before = bundle.tasks.copy()
-        bids = bundle.marks[BID, : bundle.length].copy()
+        # A task that the agent has started is no longer planned, and stays its own.
+        planned = ~self._has_started(bundle.tasks)
+        before = bundle.tasks[planned]
+        bids = bundle.marks[BID, : bundle.length][planned]
         lost = [row for row in before.tolist() if beliefs.winner[row] != self._me]
         bundle.build(beliefs.bid, beliefs.winner, changed, self._kept())
         beliefs.claim(before, bundle.order, bundle.marks, bundle.length)
@@ -315,9 +317,9 @@ class ConsensusAuction(Negotiator):
         for row, bid in zip(held, old_bids, strict=True):
             if row in now_held:
                 continue
-            if row in lost:
-                winner = int(beliefs.winner[row])
-                by = None if winner == NO_AGENT else self._arrays.agent_ids[winner]
+            winner = int(beliefs.winner[row])
+            if row in lost and winner != NO_AGENT:
+                by = self._arrays.agent_ids[winner]
                 self._events.append(TaskOutbid(ids[row], bid, by, float(beliefs.bid[row])))
                 because = because or ids[row]
             else:
@@ -390,6 +392,7 @@ class ConsensusAuction(Negotiator):
         """See `Negotiator.start_task`."""
         row = self._row(task_id)
         task = self._arrays.tasks[row]
+        self._bundle.take_out(row)
         self._bundle.close(row)
         self._bundle.move(task.position, now + task.duration)
         self._started.append((row, now))
@@ -403,6 +406,7 @@ class ConsensusAuction(Negotiator):
             raise ValueError(f"task {task_id} was not started by {self.agent_id}; call start_task first")
         self._started = [(started, start) for started, start in self._started if started != row]
         self._bundle.move(self._arrays.tasks[row].position, now)
+        self._beliefs.set(row, self._me, DONE_BID)
         self._change()
 
     def set_position(self, position: Position, now: float) -> None:
@@ -411,9 +415,13 @@ class ConsensusAuction(Negotiator):
         self._change()
 
     def leave(self) -> None:
-        """See `Negotiator.leave`."""
+        """See `Negotiator.leave`. What has been started is finished, so it is not open to others."""
         for row in self._bundle.tasks.tolist():
-            self._beliefs.set(row, NO_AGENT, 0.0)
+            if self._beliefs.winner[row] == self._me:
+                self._beliefs.set(row, NO_AGENT, 0.0)
+            self._events.append(TaskReleased(self._arrays.task_ids[row], None))
+        for row, _ in self._started:
+            self._beliefs.set(row, self._me, DONE_BID)
         self._bundle.drop_all()
         self._left[self._me] = _last_stamp(self._stamp)
         self._full_for = FULL_AFTER_ASKED
@@ -455,6 +463,13 @@ class ConsensusAuction(Negotiator):
     @property
     def _leaving(self) -> bool:
         return self._me in self._left
+
+    def _has_started(self, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Which of these tasks this agent does or has done."""
+        beliefs = self._beliefs
+        started: NDArray[np.bool_] = beliefs.winner[rows] == self._me
+        started &= beliefs.bid[rows] == STARTED_BID
+        return started
 
     def _row(self, task_id: str) -> int:
         if task_id not in self._arrays.task_row:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,9 @@ from numpy.typing import NDArray
 from swarmbid.arrays import NO_AGENT, FloatArray, IntArray, MissionArrays, StampArray
 from swarmbid.kernels import consensus, wire
 from swarmbid.messages import NOT_LISTED, Beliefs, MessageError
+
+DONE_BID = sys.float_info.max
+"""Bid on a task that is done, or that its agent finishes as it leaves: it is never open again."""
 
 
 class BeliefTable:
@@ -81,8 +85,8 @@ class BeliefTable:
         self.flags[row] |= consensus.TO_SEND | consensus.TO_WEIGH
 
     def open_all_of(self, agent: int) -> bool:
-        """Forget every win of an agent that is gone; return whether there was one."""
-        rows = np.flatnonzero(self.winner == agent)
+        """Forget every win of an agent that is gone, but for what is done; return whether there was one."""
+        rows = np.flatnonzero((self.winner == agent) & (self.bid < DONE_BID))
         for row in rows.tolist():
             self.set(row, NO_AGENT, 0.0)
         return rows.size > 0

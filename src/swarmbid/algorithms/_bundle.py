@@ -20,10 +20,12 @@ from swarmbid.arrays import (
     MissionArrays,
 )
 from swarmbid.kernels.bundle import (
+    BID,
     BUNDLE,
     NUM_MARK_ROWS,
     NUM_ORDER_ROWS,
     PATH,
+    PROMISED,
     START,
     bounds,
     build_bundle,
@@ -69,6 +71,7 @@ class Bundle:
         self._known = 0
         self._build = _phase(score)
         self._closed: set[int] = set()
+        self._moved = False
         self._bound()
 
     @property
@@ -95,6 +98,9 @@ class Bundle:
         self, bid_to_beat: FloatArray, rank_to_beat: IntArray, changed: NDArray[np.int64], kept: int
     ) -> None:
         """Take tasks afresh (phase 1); the parameters are those of `build_bundle`."""
+        if self._moved:  # places and promised times were counted from elsewhere: none may be kept
+            self.length = kept = 0
+            self._moved = False
         self.length, self._known = self._build(
             self._table, self._fixed, self._vector, self.me, RULES[self.insertion], self.warp,
             bid_to_beat, rank_to_beat, kept, self._known, self.length, changed,
@@ -127,7 +133,18 @@ class Bundle:
         self._vector[RANGE] -= flown
         self._vector[AGENT_X : AGENT_Z + 1] = position
         self._vector[AVAILABLE] = free_at
+        self._moved = True
         self._bound()
+
+    def take_out(self, row: int) -> None:
+        """Remove a task without giving it up: it has been started. The path is built afresh next time."""
+        length = self.length
+        for line, marks in ((BUNDLE, (BID, PROMISED)), (PATH, (START,))):
+            stay = self.order[line, :length] != row
+            self.length = int(np.count_nonzero(stay))
+            self.order[line, : self.length] = self.order[line, :length][stay]
+            for mark in marks:
+                self.marks[mark, : self.length] = self.marks[mark, :length][stay]
 
     def drop_all(self) -> None:
         """Give up the whole bundle."""
@@ -140,6 +157,7 @@ class Bundle:
         limit = self.limit if agent.bundle_limit is not None else arrays.bundle_limit(agent)
         moved = Bundle(arrays, self.me, self.score, limit=limit, insertion=self.insertion, warp=self.warp)
         moved._vector[:] = self._vector
+        moved._moved = self._moved
         moved._bound()
         rows = np.array([arrays.task_row[task_id] for task_id in self.arrays.task_ids], np.int64)
         for row in sorted(self._closed):

@@ -9,19 +9,27 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
+from pathlib import Path
 from types import FunctionType
 from typing import Any
 
-from numba import njit
+from numba import njit, typeof
+from numba.core.errors import NumbaError
 
 from swarmbid.arrays import DECAY, DURATION, END, INVERSE_WIDTH, OPEN, PEAK, REWARD, VisitRecord
+from swarmbid.errors import Fault, InputError
 from swarmbid.kernels import bundle, insertion
 
 
 @lru_cache(maxsize=16)
 def phase_with(function: Callable[[VisitRecord], float]) -> Callable[..., Any]:
-    """Return `build_bundle` for the score that `function` gives (about two seconds, once)."""
-    score = njit(function)
+    """Return `build_bundle` for the score that `function` gives (some seconds, once).
+
+    Raises
+    ------
+    InputError : the function does what cannot be compiled.
+    """
+    score = _compiled(function)
 
     @njit
     def visit(tasks, task, start, leg, cost):
@@ -61,6 +69,20 @@ def phase_with(function: Callable[[VisitRecord], float]) -> Callable[..., Any]:
     evaluate = _rebuilt(insertion.evaluate, parts)
     weigh = _rebuilt(bundle.weigh, {"evaluate": evaluate})
     return _rebuilt(bundle.build_bundle, {"path_state": path_state, "evaluate": evaluate, "weigh": weigh})
+
+
+def _compiled(function: Callable[[VisitRecord], float]) -> Any:
+    compiled = njit(function)
+    if hasattr(compiled, "compile"):  # with the compiler off there is nothing to try
+        try:
+            compiled.compile((typeof(VisitRecord(*[0.0] * len(VisitRecord._fields))),))
+        except NumbaError as error:
+            source = Path(function.__code__.co_filename).name
+            # The first line only says which step of the compiler failed.
+            why = next((line.strip() for line in str(error).splitlines()[1:] if line.strip()), str(error))
+            mend = "Use numbers, arithmetic and math only, and the fields of VisitRecord."
+            raise InputError([Fault(f"score {source}", "", f"cannot be compiled: {why}", mend)]) from None
+    return compiled
 
 
 def _rebuilt(kernel: Any, parts: dict[str, Any]) -> Callable[..., Any]:

@@ -1,0 +1,7 @@
+"""``python -m swarmbid``."""
+
+from __future__ import annotations
+
+from swarmbid.cli import main
+
+main()

@@ -1,0 +1,80 @@
+"""The command line: one command per file, nothing heavy imported before a command runs.
+
+Exit status: 0 done; 1 the mission cannot be fully served, the agents did not agree, or the plan breaks a
+rule (said which); 2 bad input or usage.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+
+import typer
+
+from swarmbid import __version__
+from swarmbid.cli import bench, listing, plan, schema, simulate, why
+from swarmbid.cli.output import complain
+from swarmbid.errors import InputError
+
+app = typer.Typer(
+    name="swarmbid",
+    help="A team of robots divides its work among themselves, with no leader.",
+    add_completion=True,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+app.command("plan")(plan.plan)
+app.command("simulate")(simulate.simulate)
+app.command("why")(why.why)
+app.command("bench")(bench.bench)
+app.command("schema")(schema.schema)
+app.command("list")(listing.list_)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"swarmbid {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: bool = typer.Option(
+        False, "--version", callback=_version, is_eager=True, help="Print the version and stop."
+    ),
+) -> None:
+    pass
+
+
+def main() -> None:
+    """Run the command line; every failure ends in words and a status, never in a traceback."""
+    try:
+        status = app(standalone_mode=False)
+    except InputError as error:
+        status = complain(str(error), 2)
+    except KeyboardInterrupt:
+        status = complain("stopped", 130)
+    except BrokenPipeError:
+        # The reader (say, `head`) has had enough. Let the interpreter's last flush go nowhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        status = 0
+    except Exception as error:
+        status = _unforeseen(error)
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+def _unforeseen(error: Exception) -> int:
+    """Usage errors of the command line library, and what nobody foresaw."""
+    status = getattr(error, "exit_code", None)
+    if isinstance(status, int):
+        message = getattr(error, "format_message", lambda: "")()
+        return complain(message, status) if message else status
+    if os.environ.get("SWARMBID_DEBUG"):
+        raise error
+    what = f"{type(error).__name__}: {error}"
+    return complain(
+        f"this is a fault of swarmbid, not yours: {what}\n"
+        "Please report it with what you typed; SWARMBID_DEBUG=1 shows where it happened.",
+        1,
+    )

@@ -1,0 +1,114 @@
+"""What every command prints alike: tables, JSON, complaints, files."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from swarmbid.errors import Fault, InputError
+
+
+def complain(message: str, status: int) -> int:
+    """Print a message to standard error and return `status`."""
+    print(f"swarmbid: {message}", file=sys.stderr)
+    return status
+
+
+def say(*lines: str) -> None:
+    """Print lines to standard output."""
+    for line in lines:
+        print(line)
+
+
+def say_json(data: Any) -> None:
+    """Print data as JSON; keys keep their order, so equal results print equal bytes."""
+    print(json.dumps(data, indent=2, ensure_ascii=False))
+
+
+def say_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, left: int = 1) -> None:
+    """Print a table: with lines and colours on a terminal, plain and of fixed width elsewhere.
+
+    Parameters
+    ----------
+    left : how many columns, counted from the first, are text; the others are numbers, set right.
+    """
+    cells = [list(row) for row in rows]
+    if sys.stdout.isatty():
+        from rich.console import Console
+        from rich.table import Table
+
+        table = Table(header_style="bold", box=None, pad_edge=False, padding=(0, 2, 0, 0))
+        for place, heading in enumerate(headings):
+            table.add_column(heading, justify="left" if place < left else "right", overflow="fold")
+        for row in cells:
+            table.add_row(*row)
+        Console(markup=False, highlight=False).print(table)
+        return
+    widths = [max(len(row[k]) for row in [list(headings), *cells]) for k in range(len(headings))]
+    for row in [list(headings), *cells]:
+        parts = [
+            text.ljust(width) if k < left else text.rjust(width)
+            for k, (text, width) in enumerate(zip(row, widths, strict=True))
+        ]
+        print("  ".join(parts).rstrip())
+
+
+@contextmanager
+def progress(what: str) -> Iterator[Any]:
+    """Yield a function (done, total) that moves a bar; silent when standard error is no terminal."""
+    if not sys.stderr.isatty():
+        yield lambda done, total: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file whole or not at all.
+
+    Raises
+    ------
+    InputError : it cannot be written; an older file of that name stays as it was.
+    """
+    partial = path.with_name(path.name + ".part")
+    try:
+        if path.exists() and not path.is_file():  # a pipe or a device
+            path.write_text(text, encoding="utf-8")
+            return
+        partial.write_text(text, encoding="utf-8")
+        partial.replace(path)
+    except OSError as error:
+        mend = "Give a path in a directory that exists and that you may write to."
+        raise InputError(
+            [Fault(str(path), "", f"cannot be written: {error.strerror or error}", mend)]
+        ) from None
+
+
+def check_writable(*paths: Path | None) -> None:
+    """Refuse output paths that cannot be written before any work is done.
+
+    Raises
+    ------
+    InputError : naming each.
+    """
+    faults = []
+    for path in paths:
+        if path is None:
+            continue
+        if path.is_dir():
+            faults.append(Fault(str(path), "", "is a directory", "Give the path of a file in it."))
+        elif not path.parent.is_dir():
+            faults.append(
+                Fault(str(path), "", f"lies in {path.parent}, which is no directory", "Make it first.")
+            )
+    if faults:
+        raise InputError(faults)

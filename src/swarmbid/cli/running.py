@@ -1,0 +1,143 @@
+"""What `plan` and `simulate` have in common: run, check, tell, write."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from swarmbid.cli.output import complain, say, say_json, say_table, write_text
+from swarmbid.model import Mission
+
+
+def carry_out(
+    mission: Mission,
+    *,
+    algorithm: str,
+    score: str | None,
+    insertion: str | None,
+    network: Any,
+    seed: int,
+    mode: str,
+    trace: Path | None,
+    plan_file: Path | None,
+    report: Path | None,
+    as_json: bool,
+    max_rounds: int | None = None,
+) -> int:
+    """Run a negotiation, print what came of it, write what was asked for; return the exit status."""
+    import swarmbid.simulator as simulator
+    from swarmbid.metrics import measure
+    from swarmbid.trace import read_trace
+    from swarmbid.verify import verify
+
+    run = simulator.simulate(
+        mission,
+        algorithm=algorithm,
+        score=score,
+        insertion=insertion,
+        network=network,
+        seed=seed,
+        trace=trace,
+        mode=mode,
+        max_rounds=max_rounds,
+    )
+    plan = run.plan
+    violations = verify(mission, plan, run.score)
+    if plan_file is not None:
+        write_text(plan_file, json.dumps(plan.to_dict(), indent=1) + "\n")
+    if report is not None:
+        from swarmbid.report import render_report
+
+        record = read_trace(trace) if trace is not None else None
+        write_text(report, render_report(mission, plan, record, violations))
+    problems = []
+    if not run.converged:
+        problems.append(f"the agents did not agree: {run.reason}")
+    if plan.unserved:
+        problems.append(f"{len(plan.unserved)} of {len(mission.tasks)} tasks are not served")
+    if violations:
+        problems.append(f"the plan breaks {len(violations)} rules; the first: {violations[0]}")
+    figures = {
+        "status": run.status,
+        "reason": run.reason,
+        "rounds": run.rounds,
+        "last_bid_round": run.last_bid_round,
+        "declared_round": run.declared_round,
+        "messages": run.messages,
+        "bytes": run.bytes,
+        "dropped": run.dropped,
+    }
+    if as_json:
+        metrics = measure(read_trace(trace)).to_dict() if trace is not None else None
+        say_json(
+            {
+                "run": figures,
+                "metrics": metrics,
+                "plan": plan.to_dict(),
+                "disagreements": run.disagreements,
+                "violations": [str(violation) for violation in violations],
+                "problems": problems,
+            }
+        )
+    else:
+        _tell(mission, run, plan, problems)
+        _tell_files(plan_file, report, trace, plan)
+    for problem in problems:
+        complain(problem, 1)
+    return 1 if problems else 0
+
+
+def _tell(mission: Mission, run: Any, plan: Any, problems: list[str]) -> None:
+    served = len(mission.tasks) - len(plan.unserved)
+    agreed = (
+        f"agreed in {run.rounds} rounds, known to all after {run.declared_round}"
+        if run.converged
+        else "NOT AGREED"
+    )
+    say(
+        f"{mission.name}: {served} of {len(mission.tasks)} tasks served by {len(mission.agents)} agents; {agreed}."
+    )
+    honest = (
+        "" if plan.honest_score == plan.total_score else f" ({plan.honest_score:,.6g} with every leg once)"
+    )
+    say(
+        f"Score {plan.total_score:,.6g}{honest} by {run.algorithm}, {run.score.name}, {run.insertion}; "
+        f"{run.messages:,} messages, {run.bytes:,} bytes."
+    )
+    say("")
+    say_table(
+        ["agent", "tasks", "km", "done at s", "score", "path"],
+        [
+            [
+                one.agent,
+                str(len(one.visits)),
+                f"{one.distance / 1000.0:.2f}",
+                f"{one.finish:.0f}" if one.visits else "-",
+                f"{one.score:.2f}",
+                " ".join(visit.task for visit in one.visits[:6]) + (" ..." if len(one.visits) > 6 else ""),
+            ]
+            for one in plan.agents
+        ],
+    )
+    if plan.unserved:
+        say("", "Not served:")
+        say_table(
+            ["task", "reason", "detail"],
+            [[left.task, left.reason, left.detail] for left in plan.unserved[:20]],
+            left=3,
+        )
+        if len(plan.unserved) > 20:
+            say(f"and {len(plan.unserved) - 20} more; the plan file and the report have them all.")
+
+
+def _tell_files(plan_file: Path | None, report: Path | None, trace: Path | None, plan: Any) -> None:
+    if plan_file is None and report is None and trace is None:
+        return
+    say("")
+    for what, path in (("plan", plan_file), ("report", report), ("trace", trace)):
+        if path is not None:
+            say(f"{what + ':':<8}{path}")
+    first = next((visit.task for one in plan.agents for visit in one.visits), None)
+    if trace is not None and first is not None:
+        say(f"{'next:':<8}swarmbid why {trace} {first}")

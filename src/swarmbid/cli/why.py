@@ -1,0 +1,27 @@
+"""``swarmbid why``: explain what became of one task."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from swarmbid.cli.plan import AsJson
+
+
+def why(
+    trace: Annotated[Path, typer.Argument(metavar="TRACE", help="Record of a run, JSON lines.")],
+    task: Annotated[str, typer.Argument(metavar="TASK", help="Id of a task of its mission.")],
+    as_json: AsJson = False,
+) -> None:
+    """Tell who bid what for TASK, who won, who was outbid, and why the others do not do it."""
+    from swarmbid.cli.output import say, say_json
+    from swarmbid.trace import read_trace
+    from swarmbid.why import explain
+
+    explanation = explain(read_trace(trace), task)
+    if as_json:
+        say_json(explanation.to_dict())
+    else:
+        say(str(explanation))

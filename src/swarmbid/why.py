@@ -1,0 +1,222 @@
+"""Why a task went to whom it went: who bid, who won, who was outbid, and why the others did not bid.
+
+What happened is read from the trace. What each agent could gain in the end is worked out again from the
+mission and the final plan in plain Python, so that the answer does not depend on the negotiation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from swarmbid.errors import Fault, InputError, did_you_mean
+from swarmbid.model import Mission, Task
+from swarmbid.plan import Plan
+from swarmbid.scores import Score, make_score
+from swarmbid.trace import Outbid, Released, Taken, Trace
+from swarmbid.unserved import offers
+
+
+@dataclass(frozen=True)
+class Step:
+    """One thing that happened to the task.
+
+    Parameters
+    ----------
+    t : s. agent : id. what : a sentence without its subject.
+    """
+
+    t: float
+    agent: str
+    what: str
+
+
+@dataclass(frozen=True)
+class Other:
+    """An agent that does not do the task.
+
+    Parameters
+    ----------
+    agent : id. best_bid : the highest that it ever bid, score units; None if it never did.
+    gain : what adding the task to its final path would gain; None if it cannot be added.
+    why : a sentence.
+    """
+
+    agent: str
+    best_bid: float | None
+    gain: float | None
+    why: str
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """The answer.
+
+    Parameters
+    ----------
+    task : what it is. winner : the agent's id; None if nobody does it. bid : the winning bid.
+    start : s, planned. outcome : a sentence. history : in order of time. others : in order of id.
+    """
+
+    task: str
+    needs: str
+    winner: str | None
+    bid: float | None
+    start: float | None
+    outcome: str
+    history: tuple[Step, ...]
+    others: tuple[Other, ...]
+    in_rounds: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same, ready for JSON."""
+        return asdict(self)
+
+    def __str__(self) -> str:
+        lines = [f"{self.task}: {self.needs}", self.outcome]
+        if self.history:
+            lines += ["", "What happened"]
+            when = [
+                f"round {int(step.t) + 1}" if self.in_rounds else f"{step.t:.6g} s" for step in self.history
+            ]
+            width = max(map(len, when))
+            lines += [
+                f"  {time:<{width}}  {step.agent} {step.what}"
+                for time, step in zip(when, self.history, strict=True)
+            ]
+        if self.others:
+            lines += ["", "The others, given what they do in the end"]
+            width = max(len(other.agent) for other in self.others)
+            lines += [f"  {other.agent:<{width}}  {other.why}" for other in self.others]
+        return "\n".join(lines)
+
+
+def explain(trace: Trace, task_id: str) -> Explanation:
+    """Explain what became of one task.
+
+    Parameters
+    ----------
+    trace : of a run that ended (`swarmbid.trace.read_trace`).
+
+    Raises
+    ------
+    InputError : there is no such task, or the run did not end.
+    """
+    mission = trace.mission()
+    tasks = {task.id: task for task in mission.tasks}
+    if task_id not in tasks:
+        mend = did_you_mean(task_id, tasks) or f"It has {len(tasks)} tasks; the plan lists them."
+        raise InputError([Fault(trace.source, "task", f"has no task {task_id!r}", mend)])
+    task = tasks[task_id]
+    plan = Plan.from_dict(trace.finished().plan, where=trace.source)
+    history = _history(trace, task_id)
+    bids = _best_bids(trace, task_id)
+    winner, start = _doer(plan, task_id)
+    bid = _last_bid(trace, task_id, winner)
+    return Explanation(
+        task=task_id,
+        needs=_needs(task),
+        winner=winner,
+        bid=bid,
+        start=start,
+        outcome=_outcome(plan, task_id, winner, bid, start),
+        history=history,
+        others=_others(mission, plan, trace, task, bids, bid),
+        in_rounds=trace.header.mode == "rounds",
+    )
+
+
+def _needs(task: Task) -> str:
+    parts = [f"type {task.type}", f"reward {task.reward:g}"]
+    if task.start > 0.0 or task.end != float("inf"):
+        end = "" if task.end == float("inf") else f" to {task.end:g}"
+        parts.append(f"start of service {task.start:g}{end} s" if end else f"not before {task.start:g} s")
+    if task.duration:
+        parts.append(f"{task.duration:g} s of service")
+    if task.equipment:
+        parts.append("needs " + ", ".join(sorted(task.equipment)))
+    return ", ".join(parts)
+
+
+def _history(trace: Trace, task_id: str) -> tuple[Step, ...]:
+    steps = []
+    for record in trace.records:
+        if isinstance(record, Taken) and record.task == task_id:
+            steps.append(
+                Step(record.t, record.agent, f"bids {record.bid:.6g} (as stop {record.position + 1})")
+            )
+        elif isinstance(record, Outbid) and record.task == task_id:
+            by = (
+                f"by {record.by} with {record.by_bid:.6g}"
+                if record.by
+                else "by somebody who gave it up since"
+            )
+            steps.append(Step(record.t, record.agent, f"is outbid {by} (had bid {record.bid:.6g})"))
+        elif isinstance(record, Released) and record.task == task_id:
+            because = f", having lost {record.because}" if record.because else " for a better bundle"
+            steps.append(Step(record.t, record.agent, f"gives it up{because}"))
+    return tuple(steps)
+
+
+def _best_bids(trace: Trace, task_id: str) -> dict[str, float]:
+    best: dict[str, float] = {}
+    for record in trace.of(Taken):
+        if record.task == task_id:
+            best[record.agent] = max(record.bid, best.get(record.agent, record.bid))
+    return best
+
+
+def _last_bid(trace: Trace, task_id: str, winner: str | None) -> float | None:
+    bids = [record.bid for record in trace.of(Taken) if record.task == task_id and record.agent == winner]
+    return bids[-1] if bids else None
+
+
+def _doer(plan: Plan, task_id: str) -> tuple[str | None, float | None]:
+    for one in plan.agents:
+        for visit in one.visits:
+            if visit.task == task_id:
+                return one.agent, visit.start
+    return None, None
+
+
+def _outcome(plan: Plan, task_id: str, winner: str | None, bid: float | None, start: float | None) -> str:
+    if winner is not None and start is not None:
+        won = "" if bid is None else f"; its bid of {bid:.6g} won"
+        return f"Done by {winner}, from {start:.6g} s{won}."
+    for left in plan.unserved:
+        if left.task == task_id:
+            return f"Done by nobody ({left.reason}). {left.detail}"
+    return "Done by nobody."
+
+
+def _others(
+    mission: Mission, plan: Plan, trace: Trace, task: Task, bids: dict[str, float], won: float | None
+) -> tuple[Other, ...]:
+    tasks = {one.id: one for one in mission.tasks}
+    paths = {one.agent: [(tasks[visit.task], visit.start) for visit in one.visits] for one in plan.agents}
+    header = trace.header
+    insertion = str(header.options.get("insertion", "shift"))
+    found = []
+    for offer in offers(mission, paths, _score(trace), task, algorithm=header.algorithm, insertion=insertion):
+        why = offer.detail
+        if offer.gain is not None and offer.gain <= 0.0:
+            why += ": not worth a bid"
+        elif offer.gain is not None and won is not None:
+            why += f", {'less' if offer.gain < won else 'no less'} than the bid of {won:.6g}"
+        best = bids.get(offer.agent)
+        if best is not None:
+            why += f"; it once bid {best:.6g}"
+        found.append(Other(offer.agent, best, offer.gain, why))
+    return tuple(found)
+
+
+def _score(trace: Trace) -> Score:
+    options = dict(trace.header.score)
+    name = options.pop("name")
+    if name == "custom":
+        source = options.get("source")
+        mend = "Run `swarmbid why` where the score's file is, on a trace made with --score FILE.py."
+        if not source:
+            raise InputError([Fault(trace.source, "score", "is a function that the trace cannot hold", mend)])
+        return make_score(source)
+    return make_score(name, **options)
