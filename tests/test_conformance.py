@@ -15,6 +15,7 @@ from swarmbid.algorithms._auction import STARTED_BID
 from swarmbid.algorithms.cbaa import CBAA
 from swarmbid.algorithms.cbba import CBBA
 from swarmbid.arrays import PEAK, REWARD, FloatArray, MissionArrays
+from swarmbid.messages import Message
 from swarmbid.model import Agent, Mission, Task
 from swarmbid.negotiator import Negotiator
 from swarmbid.scores import Score, make_score, task_values
@@ -188,11 +189,14 @@ class Silent(CBBA):
 
 
 class Shy(CBBA):
-    """Never asks for what it has missed, and never says anything in full."""
+    """Never asks for what it has missed, and passes everything off as the next change."""
 
-    def _speak(self, now: float, digest: int, agreed: bool, full: bool) -> Any:
-        self._asked.clear()
-        return dataclasses.replace(super()._speak(now, digest, agreed, False), since=max(self._stamp - 1, 0))
+    def tick(self, now: float) -> list[Message]:
+        self._voice.asked.clear()
+        return [
+            dataclasses.replace(said, since=max(said.sequence - 1, 0), asked=said.asked[:0])
+            for said in super().tick(now)
+        ]
 
 
 class Forgetful(CBBA):
@@ -244,7 +248,7 @@ class Clinging(CBBA):
     """Leaves and keeps its tasks."""
 
     def leave(self) -> None:
-        self._left[self._me] = self._stamp + 1
+        self._left[self._me] = self._voice.stamp + 1
         self._change()
 
 

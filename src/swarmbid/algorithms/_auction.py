@@ -21,11 +21,12 @@ from numpy.typing import NDArray
 from swarmbid.algorithms._agreement import Agreement
 from swarmbid.algorithms._beliefs import DONE_BID, BeliefTable, translated
 from swarmbid.algorithms._bundle import RULES, Bundle
-from swarmbid.arrays import NO_AGENT, IntArray, MissionArrays, StampArray
+from swarmbid.algorithms._voice import FULL_AFTER_ASKED, Voice
+from swarmbid.arrays import NO_AGENT, MissionArrays, StampArray
 from swarmbid.errors import Fault, InputError
 from swarmbid.kernels.bundle import BID, PATH, START
 from swarmbid.kernels.consensus import TO_SEND, TO_WEIGH
-from swarmbid.messages import INCARNATION, NOT_LISTED, Beliefs, Message, MessageError
+from swarmbid.messages import INCARNATION, Beliefs, Message, MessageError
 from swarmbid.model import Mission, Position, Task
 from swarmbid.negotiator import (
     Agreed,
@@ -41,10 +42,6 @@ from swarmbid.scores import Score, make_score
 
 STARTED_BID = DONE_BID / 2.0
 """Bid on a task that has been started: nobody outbids it, but it is open again if its agent is lost."""
-NO_ROWS: IntArray = np.zeros(0, np.int32)
-NO_STAMPS: StampArray = np.zeros(0, np.int64)
-FULL_AFTER_ASKED = 30
-"""Full states sent in a row once one was asked for: a link that lost one message loses more."""
 
 
 class ConsensusAuction(Negotiator):
@@ -90,11 +87,10 @@ class ConsensusAuction(Negotiator):
         self.agent_id = agent_id
         self.period = period
         self.heartbeat = heartbeat
-        self.full_every = full_every
         self.idle_every = idle_every
         self._rebuild = rebuild
         self._reception = stamps == "reception"
-        self._check(arrays, insertion, stamps)
+        self._check(arrays, insertion, stamps, full_every)
         self._arrays = arrays
         self._me = arrays.agent_row[agent_id]
         found = make_score(score)
@@ -106,24 +102,16 @@ class ConsensusAuction(Negotiator):
         self._beliefs = BeliefTable(arrays, self._me)
         self._agreement = Agreement(arrays.num_agents, self._me)
         self._received: StampArray = np.zeros(arrays.num_agents, np.int64)
-        self._asked: set[int] = set()
-        self._full_for = 0
-        self._stamp = incarnation * INCARNATION
-        self._previous = 0
-        self._told_heard: StampArray = np.full(arrays.num_agents, NOT_LISTED, np.int64)
-        self._told_digest = -1
-        self._digest_at = 0
-        self._since_full = 0
+        self._voice = Voice(agent_id, arrays.num_agents, incarnation=incarnation, full_every=full_every)
         self._started: list[tuple[int, float]] = []
         self._left: dict[int, int] = {}
         self._agreed = False
         self._must_build = True
         self._events: list[Event] = []
-        self._last_spoken = -np.inf
         self._due = -np.inf
         self._busy = True
 
-    def _check(self, arrays: MissionArrays, insertion: str | None, stamps: str) -> None:
+    def _check(self, arrays: MissionArrays, insertion: str | None, stamps: str, full_every: int) -> None:
         where = f"agent {self.agent_id}"
         faults = []
         if self.agent_id not in arrays.agent_row:
@@ -133,11 +121,7 @@ class ConsensusAuction(Negotiator):
             faults.append(Fault(where, "insertion", f"is {insertion!r}", mend))
         if stamps not in ("originator", "reception"):
             faults.append(Fault(where, "stamps", f"is {stamps!r}", "Give 'originator' or 'reception'."))
-        if (
-            min(self.full_every, self.idle_every) < 1
-            or not self.period > 0.0
-            or not self.heartbeat >= self.period
-        ):
+        if min(full_every, self.idle_every) < 1 or not self.period > 0.0 or not self.heartbeat >= self.period:
             mend = "Give full_every and idle_every of 1 or more, a period above 0 s, a heartbeat no shorter."
             faults.append(Fault(where, "period, heartbeat, full_every, idle_every", "do not fit", mend))
         if faults:
@@ -151,8 +135,7 @@ class ConsensusAuction(Negotiator):
         """How many tasks of the bundle, counted from its first, stay without question."""
         if self._rebuild:
             return 0
-        tasks = self._bundle.tasks
-        still = (self._beliefs.winner[tasks] == self._me) & ~self._has_started(tasks)
+        still = self._beliefs.winner[self._bundle.tasks] == self._me
         return int(np.argmin(still)) if not still.all() else self._bundle.length
 
     # --- the door in
@@ -185,12 +168,12 @@ class ConsensusAuction(Negotiator):
         # What is said of digests stands on its own, so it counts even where the beliefs cannot.
         self._agreement.hear(sender, message)
         if message.asked.size and self._me in message.asked:
-            self._full_for = FULL_AFTER_ASKED
+            self._voice.repeat(FULL_AFTER_ASKED)
         if message.since > last:
-            self._asked.add(sender)
+            self._voice.asked.add(sender)
             return "gap"
         self._received[sender] = message.sequence
-        self._asked.discard(sender)
+        self._voice.asked.discard(sender)
         heard = message.heard
         if self._reception:
             heard = heard.copy()
@@ -201,9 +184,9 @@ class ConsensusAuction(Negotiator):
         self._beliefs.resolve(self.DECISIONS, sender, message, heard)
         if self._left:
             self._open_what_is_left()
-        if self._agreed and not message.settled and now - self._last_spoken >= 2.0 * self.period:
+        if self._agreed and not message.settled and now - self._voice.last_spoken >= 2.0 * self.period:
             # Somebody still doubts though we have long been silent: a word of ours was lost.
-            self._full_for = max(self._full_for, 1)
+            self._voice.repeat()
         return None
 
     # --- the door out
@@ -214,7 +197,7 @@ class ConsensusAuction(Negotiator):
             return float(self._due)
         if self._leaving:
             return None
-        return float(self._last_spoken + self.heartbeat)
+        return float(self._voice.last_spoken + self.heartbeat)
 
     def tick(self, now: float) -> list[Message]:
         """Build if bids changed, then speak if there is something to say; see `Negotiator.tick`."""
@@ -230,74 +213,38 @@ class ConsensusAuction(Negotiator):
         if agreed != self._agreed:
             self._agreed = agreed
             self._events.append(Agreed() if agreed else Doubted())
-        heartbeat = now >= self._last_spoken + self.heartbeat
+        voice = self._voice
+        silent_for = now - voice.last_spoken
+        heartbeat = silent_for >= self.heartbeat
         speak = (
             heartbeat
-            or (not agreed and now >= self._last_spoken + self.idle_every * self.period)
-            or self._full_for > 0
-            or bool(self._asked)
-            or digest != self._told_digest
+            or (not agreed and silent_for >= self.idle_every * self.period)
+            or voice.has_news(digest)
             or self._agreement.has_news(digest)
             or bool(pending & TO_SEND)
         )
         if self._leaving:
-            speak = self._full_for > 0  # a last word, a few times over; then silence
-        self._busy = self._full_for > 1 or not (agreed or self._leaving)
+            speak = voice.full_for > 0  # a last word, a few times over; then silence
+        self._busy = voice.full_for > 1 or not (agreed or self._leaving)
         if not speak:
             if not self._busy:
                 self._due = -np.inf
             return []
-        full = (
-            self._previous == 0 or heartbeat or self._full_for > 0 or self._since_full >= self.full_every - 1
-        )
-        return [self._speak(now, digest, agreed, full)]
-
-    def _speak(self, now: float, digest: int, agreed: bool, full: bool) -> Beliefs:
-        beliefs, arrays = self._beliefs, self._arrays
-        self._stamp += 1
-        if not self._reception:
-            beliefs.heard[self._me] = self._stamp
-        if digest != self._told_digest:
-            self._told_digest = digest
-            self._digest_at = self._stamp
-        tasks, winners, bids, heard = beliefs.compose(full, self._told_heard)
-        holders, held_at = self._agreement.tell(digest, everything=full)
-        left = self._left
-        message = Beliefs(
-            sender=self.agent_id,
-            sequence=self._stamp,
-            since=0 if full else self._previous,
-            agent_ids=arrays.agent_ids,
-            task_ids=arrays.task_ids,
-            heard=heard,
-            tasks=tasks,
-            winners=winners,
-            bids=bids,
-            digest=digest,
-            digest_at=self._digest_at,
-            agreed=holders,
-            agreed_at=held_at,
-            asked=np.array(sorted(self._asked), np.int32) if self._asked else NO_ROWS,
-            left=np.array(list(left), np.int32) if left else NO_ROWS,
-            left_at=np.array(list(left.values()), np.int64) if left else NO_STAMPS,
-            settled=agreed,
-        )
-        self._previous = self._stamp
-        self._since_full = 0 if full else self._since_full + 1
-        self._full_for = max(self._full_for - 1, 0)
-        self._last_spoken = now
-        return message
+        return [
+            voice.say(
+                now, self._beliefs, self._agreement, self._left,
+                own_stamps=not self._reception, settled=agreed, heartbeat=heartbeat,
+            )
+        ]  # fmt: skip
 
     def _build(self) -> None:
         """Phase 1, and what it changes in the beliefs."""
         bundle, beliefs = self._bundle, self._beliefs
-        changed, build = bundle.to_weigh(beliefs.flags, TO_WEIGH, beliefs.bid, beliefs.winner)
+        changed, build = bundle.to_weigh(beliefs.take_flagged(TO_WEIGH), beliefs.bid, beliefs.winner)
         if not build and not self._must_build:
             return
-        # A task that the agent has started is no longer planned, and stays its own.
-        planned = ~self._has_started(bundle.tasks)
-        before = bundle.tasks[planned]
-        bids = bundle.marks[BID, : bundle.length][planned]
+        before = bundle.tasks.copy()
+        bids = bundle.marks[BID, : bundle.length].copy()
         lost = [row for row in before.tolist() if beliefs.winner[row] != self._me]
         bundle.build(beliefs.bid, beliefs.winner, changed, self._kept())
         beliefs.claim(before, bundle.order, bundle.marks, bundle.length)
@@ -423,8 +370,8 @@ class ConsensusAuction(Negotiator):
         for row, _ in self._started:
             self._beliefs.set(row, self._me, DONE_BID)
         self._bundle.drop_all()
-        self._left[self._me] = _last_stamp(self._stamp)
-        self._full_for = FULL_AFTER_ASKED
+        self._left[self._me] = _last_stamp(self._voice.stamp)
+        self._voice.repeat(FULL_AFTER_ASKED)
         self._change()
 
     def lose_agent(self, agent_id: str) -> None:
@@ -438,13 +385,12 @@ class ConsensusAuction(Negotiator):
     def _note_left(self, row: int, stamp: int) -> None:
         """An agent is gone, with all that it said up to `stamp`."""
         if row == self._me:
-            if stamp >= self._stamp and not self._leaving:
+            if stamp >= self._voice.stamp and not self._leaving:
                 # Somebody gave us up, but we are here: speak on as a new incarnation.
-                self._stamp = stamp + 1
-                self._full_for = max(self._full_for, 1)
+                self._voice.reincarnate(stamp)
         elif stamp > self._left.get(row, 0):
             self._left[row] = stamp
-            self._full_for = max(self._full_for, 1)
+            self._voice.repeat()
         self._busy = True
 
     def _open_what_is_left(self) -> None:
@@ -463,13 +409,6 @@ class ConsensusAuction(Negotiator):
     @property
     def _leaving(self) -> bool:
         return self._me in self._left
-
-    def _has_started(self, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Which of these tasks this agent does or has done."""
-        beliefs = self._beliefs
-        started: NDArray[np.bool_] = beliefs.winner[rows] == self._me
-        started &= beliefs.bid[rows] == STARTED_BID
-        return started
 
     def _row(self, task_id: str) -> int:
         if task_id not in self._arrays.task_row:

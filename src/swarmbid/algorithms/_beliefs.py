@@ -66,6 +66,10 @@ class BeliefTable:
         """All flags of all tasks, joined."""
         return int(consensus.any_flags(self.flags))
 
+    def take_flagged(self, flag: int) -> IntArray:
+        """Return the rows that carry `flag`, and take it off them."""
+        return consensus.take_flagged(self.flags, flag)  # type: ignore[no-any-return]
+
     def claim(self, before: NDArray[np.int64], order: Any, marks: Any, length: int) -> bool:
         """Make the beliefs agree with the agent's new bundle; return whether one changed."""
         arrays = self.arrays

@@ -86,13 +86,12 @@ class Bundle:
         return list(zip(rows.tolist(), starts.tolist(), strict=True))
 
     def to_weigh(
-        self, flags: NDArray[np.uint8], flag: int, bid_to_beat: FloatArray, rank_to_beat: IntArray
+        self, changed: IntArray, bid_to_beat: FloatArray, rank_to_beat: IntArray
     ) -> tuple[NDArray[np.int64], bool]:
-        """Which flagged tasks could enter, and whether to build; see `worth_weighing`."""
+        """Which of the changed tasks could enter, and whether to build; see `worth_weighing`."""
         return worth_weighing(  # type: ignore[no-any-return]
-            flags, flag, self.me, bid_to_beat, rank_to_beat,
-            self._bounds, self._place_of, self.order, self.length,
-        )  # fmt: skip
+            changed, self.me, bid_to_beat, rank_to_beat, self._bounds, self._place_of, self.order, self.length
+        )
 
     def build(
         self, bid_to_beat: FloatArray, rank_to_beat: IntArray, changed: NDArray[np.int64], kept: int

@@ -32,5 +32,4 @@ class CBAA(ConsensusAuction):
     def _kept(self) -> int:
         """An agent keeps its task until it is outbid."""
         held = self._bundle.tasks
-        mine = held.size > 0 and self._beliefs.winner[held[0]] == self._me
-        return int(mine and not self._has_started(held)[0])
+        return int(held.size > 0 and self._beliefs.winner[held[0]] == self._me)

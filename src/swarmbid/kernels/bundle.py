@@ -43,13 +43,13 @@ FIRST_BATCH = 32
 """Tasks evaluated before the bound is looked at again; doubled until a block is full."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def outbids(bid, rank, other_bid, other_rank):
     """The one order of bids: the higher bid; among equal bids the higher agent id (its rank here)."""
     return bid > other_bid or (bid == other_bid and rank > other_rank)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def eligible(gain, ceiling, rank, bid_to_beat, rank_to_beat):
     """Whether a bid of min(gain, ceiling) wins the task, or the agent holds it anyway (h_ij)."""
     bid = min(gain, ceiling)
@@ -58,7 +58,7 @@ def eligible(gain, ceiling, rank, bid_to_beat, rank_to_beat):
     return rank_to_beat == rank or outbids(bid, rank, bid_to_beat, rank_to_beat)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def before(gain, opens, task, best_gain, best_opens, best):
     """The one order of an agent's own candidates: larger gain, earlier window, smaller row."""
     if gain != best_gain:
@@ -66,7 +66,7 @@ def before(gain, opens, task, best_gain, best_opens, best):
     return opens < best_opens or (opens == best_opens and task < best)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def bounds(tasks, fixed, agent, out):
     """The most that each task can ever gain this agent, whatever is in its path.
 
@@ -104,7 +104,7 @@ def bounds(tasks, fixed, agent, out):
             out[first + j] = bound if arrival <= candidates[END, j] * (1.0 + 1e-12) else -np.inf
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def weigh(
     tasks, fixed, agent, path, length, starts, legs, values, total, rule, rank, ceiling,
     bid_to_beat, rank_to_beat, ranking, gain, extent, batch, count, candidates, gains, position, start_time,
@@ -134,33 +134,35 @@ def weigh(
     return best, best_gain, best_opens
 
 
-@njit(cache=True, error_model="numpy")
-def worth_weighing(flags, flag, rank, bid_to_beat, rank_to_beat, bound, place_of, order, length):
-    """Which of the flagged tasks could enter the bundle, and whether it has to be built at all.
+@njit(cache=True, nogil=True, error_model="numpy")
+def worth_weighing(changed, rank, bid_to_beat, rank_to_beat, bound, place_of, order, length):
+    """Which tasks with changed bids could enter the bundle, and whether it has to be built at all.
 
     A task whose bound does not win it cannot; while no task of the bundle is lost and none could enter,
-    a new bundle would be the old one. Takes the flag off.
+    a new bundle would be the old one.
+
+    Parameters
+    ----------
+    changed : int32[n], rows of tasks whose bid to beat changed.
 
     Returns
     -------
-    (tasks int64[n], whether to build).
+    (tasks int64[m], whether to build).
     """
-    num_tasks = flags.shape[0]
-    found = np.empty(num_tasks, np.int64)
+    found = np.empty(changed.shape[0], np.int64)
     count = 0
-    for j in range(num_tasks):
-        if flags[j] & flag:
-            flags[j] &= 255 - flag
-            if eligible(bound[place_of[j]], np.inf, rank, bid_to_beat[j], rank_to_beat[j]):
-                found[count] = j
-                count += 1
+    for i in range(changed.shape[0]):
+        j = changed[i]
+        if eligible(bound[place_of[j]], np.inf, rank, bid_to_beat[j], rank_to_beat[j]):
+            found[count] = j
+            count += 1
     build = count > 0
     for k in range(length):
         build |= rank_to_beat[order[BUNDLE, k]] != rank
     return found[:count], build
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def build_bundle(
     tasks, fixed, agent, rank, rule, warped, bid_to_beat, rank_to_beat,
     kept, known, length, changed, bound, ranking, place_of, gain, extent, order, marks,

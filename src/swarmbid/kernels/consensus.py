@@ -34,7 +34,7 @@ _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
 _MIX_2 = np.uint64(0x94D049BB133111EB)
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _scramble(x):
     """The finaliser of SplitMix64: every input bit moves every output bit."""
     x = (x ^ (x >> np.uint64(30))) * _MIX_1
@@ -42,13 +42,13 @@ def _scramble(x):
     return x ^ (x >> np.uint64(31))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def belief_hash(task_hash, winner_hash, bid_bits):
     """Hash of one belief: this agent wins this task with this bid."""
     return _scramble(task_hash + _scramble(winner_hash + _GOLDEN * bid_bits))
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def digest_of(task_hash, agent_hash, winner, bid_bits):
     """Sum of the hashes of all beliefs: the same set of beliefs gives the same digest."""
     total = np.uint64(0)
@@ -59,7 +59,7 @@ def digest_of(task_hash, agent_hash, winner, bid_bits):
     return total
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def believe(j, new_winner, new_bid, winner, bid, bid_bits, task_hash, agent_hash, digest):
     """Set one belief and keep the digest in step."""
     old = agent_hash[winner[j]] if winner[j] != NO_AGENT else np.uint64(0)
@@ -70,7 +70,7 @@ def believe(j, new_winner, new_bid, winner, bid, bid_bits, task_hash, agent_hash
     digest[0] += belief_hash(task_hash[j], new, bid_bits[j])
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True, inline="always")
 def decide(rules, me, sender, their_winner, their_bid, my_winner, my_bid, their_heard, my_heard):
     """Return the action for one task.
 
@@ -78,39 +78,27 @@ def decide(rules, me, sender, their_winner, their_bid, my_winner, my_bid, their_
     ----------
     their_heard, my_heard : int64[num_agents], stamps s_k and s_i.
     """
-    if their_winner == sender:
-        says = SENDER
-    elif their_winner == me:
-        says = RECEIVER
-    elif their_winner == NO_AGENT:
-        says = NOBODY
-    else:
-        says = OTHER
-    if my_winner == me:
-        thinks = RECEIVER
-    elif my_winner == sender:
-        thinks = SENDER
-    elif my_winner == NO_AGENT:
-        thinks = NOBODY
-    elif my_winner == their_winner:
-        thinks = SAME
-    else:
-        thinks = OTHER
-    facts = 0
+    says, thinks, facts = NOBODY, NOBODY, 0
+    # Sums of conditions, not branches: which of them hold is hard to predict.
     if their_winner != NO_AGENT:
-        if outbids(their_bid, their_winner, my_bid, my_winner):
-            facts |= BETTER
-        theirs = their_heard[their_winner]
-        if theirs > my_heard[their_winner]:
-            facts |= NEWER_THEIRS
-        elif theirs != NOT_LISTED and theirs < my_heard[their_winner]:
-            facts |= OLDER_THEIRS
-    if my_winner != NO_AGENT and their_heard[my_winner] > my_heard[my_winner]:
-        facts |= NEWER_MINE
+        says = SENDER if their_winner == sender else RECEIVER if their_winner == me else OTHER
+        theirs, mine = their_heard[their_winner], my_heard[their_winner]
+        facts += BETTER * outbids(their_bid, their_winner, my_bid, my_winner)
+        facts += NEWER_THEIRS * (theirs > mine)
+        facts += OLDER_THEIRS * ((theirs < mine) & (theirs != NOT_LISTED))
+    if my_winner != NO_AGENT:
+        thinks = OTHER
+        if my_winner == me:
+            thinks = RECEIVER
+        elif my_winner == sender:
+            thinks = SENDER
+        elif my_winner == their_winner:
+            thinks = SAME
+        facts += NEWER_MINE * (their_heard[my_winner] > my_heard[my_winner])
     return rules[says, thinks, facts]
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def resolve(
     rules, me, sender, full, winner, bid, bid_bits, heard, flags, task_hash, agent_hash, digest,
     rows, their_winners, their_bids, their_heard,
@@ -142,16 +130,16 @@ def resolve(
         action = decide(
             rules, me, sender, their_winners[i], their_bids[i], winner[j], bid[j], their_heard, heard
         )
+        # The two differ, or did: the sender has to hear of it.
+        flags[j] |= TO_SEND
+        if action == LEAVE:
+            continue
+        flags[j] |= TO_WEIGH
+        changes += 1
         if action == UPDATE:
             believe(j, their_winners[i], their_bids[i], winner, bid, bid_bits, task_hash, agent_hash, digest)
-            flags[j] |= TO_SEND | TO_WEIGH
-            changes += 1
-            continue
-        if action == RESET and winner[j] != NO_AGENT:
+        else:
             believe(j, NO_AGENT, 0.0, winner, bid, bid_bits, task_hash, agent_hash, digest)
-            flags[j] |= TO_SEND | TO_WEIGH
-            changes += 1
-        flags[j] |= TO_SEND
     if full:
         listed = np.zeros(winner.shape[0], np.bool_)
         for i in range(rows.shape[0]):
@@ -172,7 +160,7 @@ def resolve(
     return changes
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def any_flags(flags):
     """All flags of all tasks, joined."""
     joined = np.uint8(0)
@@ -181,7 +169,28 @@ def any_flags(flags):
     return joined
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
+def take_flagged(flags, flag):
+    """Return the rows that carry `flag`, and take it off them. Eight rows without any cost one look."""
+    num_tasks = flags.shape[0]
+    words = flags[: num_tasks // 8 * 8].view(np.uint64)
+    count = 0
+    for j in range(num_tasks):
+        count += (flags[j] & flag) != 0
+    rows = np.empty(count, np.int32)
+    count = 0
+    for first in range(0, num_tasks, 8):
+        if first // 8 < words.shape[0] and words[first // 8] == np.uint64(0):
+            continue
+        for j in range(first, min(first + 8, num_tasks)):
+            if flags[j] & flag:
+                rows[count] = j
+                count += 1
+                flags[j] &= 255 - flag
+    return rows
+
+
+@njit(cache=True, nogil=True)
 def claim(me, before, order, marks, length, winner, bid, bid_bits, flags, task_hash, agent_hash, digest):
     """Make the beliefs agree with the agent's new bundle.
 

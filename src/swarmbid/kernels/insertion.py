@@ -49,7 +49,7 @@ APPEND = 2
 SCRATCH_ROWS = 10
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def visit_values(candidates, count, time, leg, cost, power, bits, scale, out):
     """Score of visits side by side: lane j is column j of `candidates`, begun at time[j] after leg[j] m.
 
@@ -65,7 +65,7 @@ def visit_values(candidates, count, time, leg, cost, power, bits, scale, out):
         out[j] = reward[j] * power[j] - cost * leg[j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def later_values(tasks, task, count, time, leg, cost, power, bits, scale, out):
     """Score of one task's visit if it started at each of time[:count] after leg[j] m."""
     reference, decay = tasks[REFERENCE, task], tasks[DECAY, task]
@@ -83,14 +83,14 @@ def later_values(tasks, task, count, time, leg, cost, power, bits, scale, out):
             out[j] = reward - cost * leg[j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def leg_changes(tasks, task, start, old_leg, count, leg, cost, out):
     """What one task's visit gains if its leg becomes leg[:count] m and its start stays."""
     for j in range(count):
         out[j] = cost * (old_leg - leg[j])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def path_state(tasks, agent, path, length, hold_times, rule, starts, legs, values):
     """Times, legs and values along a path; what `evaluate` builds on.
 
@@ -128,7 +128,7 @@ def path_state(tasks, agent, path, length, hold_times, rule, starts, legs, value
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def evaluate(
     tasks, candidates, count, agent, path, length, starts, legs, values, total, rule,
     gain, position, start_time,

@@ -24,7 +24,7 @@ _LN2_LOW = 1.90821492927058770002e-10
 _ROUND = 6755399441055744.0  # 1.5 * 2^52: adding it rounds to the nearest integer
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def exp_lanes(exponent, bits, scale, count):
     """Replace `exponent` by its exponential, lane by lane, to within 1 unit in the last place or two.
 
@@ -59,7 +59,7 @@ def exp_lanes(exponent, bits, scale, count):
         exponent[j] = exponent[j] * scale[j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def distance_lanes(x, y, z, tasks, count, step, out):
     """Distances in m from one point to the first tasks of a table, rounded down to `step` if not 0."""
     xs, ys, zs = tasks[X], tasks[Y], tasks[Z]
@@ -73,7 +73,7 @@ def distance_lanes(x, y, z, tasks, count, step, out):
             out[j] = np.floor(out[j] / step + 1e-9) * step
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def distance_between(ax, ay, az, bx, by, bz, step):
     """Metres between two points, with the same arithmetic as `distance_lanes`."""
     dx = bx - ax

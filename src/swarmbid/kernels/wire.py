@@ -9,10 +9,10 @@ import numpy as np
 from numba import njit
 
 from swarmbid.arrays import NO_AGENT
-from swarmbid.kernels.consensus import NOT_LISTED, TO_SEND
+from swarmbid.kernels.consensus import NOT_LISTED, TO_SEND, take_flagged
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def compose(full, winner, bid, flags, heard, told):
     """Return the columns of the next message, and mark its tasks as sent.
 
@@ -28,33 +28,25 @@ def compose(full, winner, bid, flags, heard, told):
     unchanged are NOT_LISTED, but for those of agents that a listed task is about: a receiver weighs
     a claim by them.
     """
-    num_tasks, num_agents = winner.shape[0], heard.shape[0]
-    count = 0
-    for j in range(num_tasks):
-        if (full and winner[j] != NO_AGENT) or (not full and flags[j] & TO_SEND):
-            count += 1
-    tasks, winners = np.empty(count, np.int32), np.empty(count, np.int32)
-    bids = np.empty(count)
+    num_agents = heard.shape[0]
+    tasks = take_flagged(flags, TO_SEND)
+    if full:
+        tasks = np.flatnonzero(winner != NO_AGENT).astype(np.int32)
+    winners, bids = np.empty(tasks.shape[0], np.int32), np.empty(tasks.shape[0])
     stamps = np.empty(num_agents, np.int64)
     for m in range(num_agents):
         stamps[m] = heard[m] if full or heard[m] != told[m] else NOT_LISTED
         told[m] = heard[m]
-    count = 0
-    for j in range(num_tasks):
-        w = winner[j]
-        listed = (full and w != NO_AGENT) or (not full and flags[j] & TO_SEND)
-        flags[j] &= 255 - TO_SEND
-        if listed:
-            tasks[count] = j
-            winners[count] = w
-            bids[count] = bid[j]
-            if w != NO_AGENT:
-                stamps[w] = heard[w]
-            count += 1
+    for i in range(tasks.shape[0]):
+        w = winner[tasks[i]]
+        winners[i] = w
+        bids[i] = bid[tasks[i]]
+        if w != NO_AGENT:
+            stamps[w] = heard[w]
     return tasks, winners, bids, stamps
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def spread(stamps):
     """Largest less smallest of the stamps that are listed, and how many are."""
     low, high, count = np.int64(0), np.int64(0), 0
@@ -67,7 +59,7 @@ def spread(stamps):
     return high - low, count
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def count_columns(heard, tasks, winners, agreed, asked, left, agent_lengths, task_lengths):
     """What the size of a message follows from.
 
