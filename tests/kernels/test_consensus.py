@@ -8,7 +8,6 @@ import random
 import numpy as np
 import pytest
 
-from naive import outbids
 from naive_consensus import decide, row_of
 from swarmbid.algorithms.cbba import CBBA, DECISION_RULES, packed
 from swarmbid.arrays import NO_AGENT

@@ -10,7 +10,7 @@ import pytest
 
 from generators import random_mission
 from naive import SCORES, Judge, Path
-from swarmbid.arrays import NUM_TASK_ROWS, MissionArrays
+from swarmbid.arrays import MissionArrays
 from swarmbid.kernels import insertion
 from swarmbid.kernels.lanes import BLOCK
 from swarmbid.model import Agent, Mission, Task
@@ -55,12 +55,10 @@ class KernelView:
             table, vector, rows, length, times, RULES[rule], self.starts, self.legs, self.values
         )
         count = arrays.num_tasks
-        candidates = np.zeros((NUM_TASK_ROWS, BLOCK))
-        candidates[:, :count] = table
         self.gain, self.position, self.start = np.zeros(count), np.zeros(count, np.int64), np.zeros(count)
         insertion.evaluate(
-            table, candidates, count, vector, rows, length, self.starts, self.legs, self.values, self.flown,
-            RULES[rule], self.gain, self.position, self.start,
+            table, np.arange(count), count, vector, rows, length, self.starts, self.legs, self.values,
+            self.flown, RULES[rule], self.gain, self.position, self.start,
         )  # fmt: skip
         fixed = score.fixed(arrays, agent)
         if fixed is not None:

@@ -18,16 +18,24 @@ from swarmbid.arrays import (
     AGENT_Y,
     AGENT_Z,
     AVAILABLE,
+    DECAY,
     DISTANCE_STEP,
+    DURATION,
     END,
+    INVERSE_WIDTH,
     NO_AGENT,
-    NUM_TASK_ROWS,
     OPEN,
+    PEAK,
     READY,
+    REFERENCE,
+    REWARD,
     SLOWNESS,
+    X,
+    Y,
+    Z,
 )
-from swarmbid.kernels.insertion import HOLD, evaluate, path_state, visit_values
-from swarmbid.kernels.lanes import BLOCK, distance_lanes
+from swarmbid.kernels.insertion import HOLD, evaluate, path_state, visit_value
+from swarmbid.kernels.lanes import BLOCK, distance_between
 
 # Rows of the two bundle tables, int64[NUM_ORDER_ROWS, limit] and float64[NUM_MARK_ROWS, limit].
 BUNDLE = 0  # task rows in order of taking (b_i)
@@ -82,41 +90,33 @@ def bounds(tasks, fixed, agent, out):
     if agent[DISTANCE_STEP] > 0.0:
         out[:] = np.inf
         return
-    scratch = np.empty((6, BLOCK))
-    leg, time, power, scale, value = scratch[0], scratch[1], scratch[2], scratch[3], scratch[4]
-    bits = scale.view(np.int64)
-    candidates = np.empty((NUM_TASK_ROWS, BLOCK))
-    for first in range(0, num_tasks, BLOCK):
-        count = min(BLOCK, num_tasks - first)
-        for row in range(NUM_TASK_ROWS):
-            for j in range(count):
-                candidates[row, j] = tasks[row, first + j]
-        distance_lanes(agent[AGENT_X], agent[AGENT_Y], agent[AGENT_Z], candidates, count, 0.0, leg)
-        for j in range(count):
-            time[j] = max(agent[AVAILABLE] + leg[j] * agent[SLOWNESS], candidates[READY, j])
-        visit_values(candidates, count, time, leg, 0.0, power, bits, scale, value)
-        for j in range(count):
-            arrival = max(agent[AVAILABLE] + leg[j] * agent[SLOWNESS], candidates[OPEN, j])
-            # Rounding may lift a gain over the exact bound by a few units in the last place.
-            bound = value[j] * (1.0 + 1e-9)
-            if fixed.shape[0] > 0:
-                bound -= fixed[first + j]
-            out[first + j] = bound if arrival <= candidates[END, j] * (1.0 + 1e-12) else -np.inf
+    for j in range(num_tasks):
+        leg = distance_between(
+            agent[AGENT_X], agent[AGENT_Y], agent[AGENT_Z], tasks[X, j], tasks[Y, j], tasks[Z, j], 0.0
+        )
+        direct = agent[AVAILABLE] + leg * agent[SLOWNESS]
+        value = visit_value(
+            max(direct, tasks[READY, j]), leg, 0.0, tasks[REWARD, j], tasks[DECAY, j], tasks[REFERENCE, j],
+            tasks[PEAK, j], tasks[INVERSE_WIDTH, j], tasks[OPEN, j], tasks[END, j], tasks[DURATION, j],
+        )  # fmt: skip
+        # Rounding may lift a gain over the exact bound by a few units in the last place.
+        bound = value * (1.0 + 1e-9)
+        if fixed.shape[0] > 0:
+            bound -= fixed[j]
+        out[j] = bound if max(direct, tasks[OPEN, j]) <= tasks[END, j] * (1.0 + 1e-12) else -np.inf
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def weigh(
     tasks, fixed, agent, path, length, starts, legs, values, total, rule, rank, ceiling,
-    bid_to_beat, rank_to_beat, ranking, gain, extent, batch, count, candidates, gains, position, start_time,
+    bid_to_beat, rank_to_beat, ranking, gain, extent, batch, count, columns, gains, position, start_time,
     best, best_gain, best_opens,
 ):  # fmt: skip
     """Evaluate the batch, keep its gains, and return the best of it and of what was best before."""
     for i in range(count):
-        task = ranking[batch[i]]
-        for row in range(NUM_TASK_ROWS):
-            candidates[row, i] = tasks[row, task]
+        columns[i] = ranking[batch[i]]
     evaluate(
-        tasks, candidates, count, agent, path, length, starts, legs, values, total, rule,
+        tasks, columns, count, agent, path, length, starts, legs, values, total, rule,
         gains, position, start_time,
     )  # fmt: skip
     for i in range(count):
@@ -202,9 +202,9 @@ def build_bundle(
     taken = np.zeros(num_tasks, np.bool_)
     scratch = np.empty((3, limit + 1))
     starts, legs, values = scratch[0], scratch[1], scratch[2]
-    candidates = np.empty((NUM_TASK_ROWS, BLOCK))
     gains, start_time = np.empty(BLOCK), np.empty(BLOCK)
-    batch, position = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)
+    batch, columns = np.empty(BLOCK, np.int64), np.empty(BLOCK, np.int64)
+    position = np.empty(BLOCK, np.int64)
     path, start = order[PATH], marks[START]
     old_length = length
     length = 0
@@ -267,7 +267,7 @@ def build_bundle(
                     best, best_gain, best_opens = weigh(
                         tasks, fixed, agent, path, length, starts, legs, values, total, rule, rank, ceiling,
                         bid_to_beat, rank_to_beat, ranking, gain[row], extent[row], batch, count,
-                        candidates, gains, position, start_time, best, best_gain, best_opens,
+                        columns, gains, position, start_time, best, best_gain, best_opens,
                     )  # fmt: skip
                     count = 0
                     width = min(2 * width, BLOCK)
@@ -281,10 +281,9 @@ def build_bundle(
             place = order[PLACE, length]
             promised = marks[PROMISED, length]
         else:
-            for r in range(NUM_TASK_ROWS):
-                candidates[r, 0] = tasks[r, task]
+            columns[0] = task
             evaluate(
-                tasks, candidates, 1, agent, path, length, starts, legs, values, total, rule,
+                tasks, columns, 1, agent, path, length, starts, legs, values, total, rule,
                 gains, position, start_time,
             )  # fmt: skip
             place, promised = position[0], start_time[0]

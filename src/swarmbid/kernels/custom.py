@@ -1,8 +1,8 @@
 """Phase 1 compiled again with a user's own score in place of the coefficients.
 
 The kernel source is the same: `build_bundle`, `path_state` and `evaluate` are rebuilt from their code
-with other functions under the names `visit_values`, `later_values` and `leg_changes`. Nothing of it is
-cached on disk, for Numba would keep it under the name of the original.
+with other functions under the names `visit_value` and `timeless`. Nothing of it is cached on disk, for
+Numba would keep it under the name of the original.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 from numba import njit, typeof
 from numba.core.errors import NumbaError
 
-from swarmbid.arrays import DECAY, DURATION, END, INVERSE_WIDTH, OPEN, PEAK, REWARD, VisitRecord
+from swarmbid.arrays import VisitRecord
 from swarmbid.errors import Fault, InputError
 from swarmbid.kernels import bundle, insertion
 
@@ -32,39 +32,20 @@ def phase_with(function: Callable[[VisitRecord], float]) -> Callable[..., Any]:
     score = _compiled(function)
 
     @njit
-    def visit(tasks, task, start, leg, cost):
+    def visit_value(
+        start, leg, cost, reward, decay, reference, peak, inverse_width, window_start, window_end, duration
+    ):
         return score(
             VisitRecord(
-                tasks[REWARD, task],
-                tasks[DECAY, task],
-                tasks[OPEN, task],
-                tasks[END, task],
-                tasks[DURATION, task],
-                tasks[PEAK, task],
-                tasks[INVERSE_WIDTH, task],
-                start,
-                leg,
-                cost,
+                reward, decay, window_start, window_end, duration, peak, inverse_width, start, leg, cost
             )
         )
 
     @njit
-    def visit_values(candidates, count, time, leg, cost, power, bits, scale, out):
-        for j in range(count):
-            out[j] = visit(candidates, j, time[j], leg[j], cost)
+    def timeless(decay, inverse_width):
+        return False
 
-    @njit
-    def later_values(tasks, task, count, time, leg, cost, power, bits, scale, out):
-        for j in range(count):
-            out[j] = visit(tasks, task, time[j], leg[j], cost)
-
-    @njit
-    def leg_changes(tasks, task, start, old_leg, count, leg, cost, out):
-        old = visit(tasks, task, start, old_leg, cost)
-        for j in range(count):
-            out[j] = visit(tasks, task, start, leg[j], cost) - old
-
-    parts = {"visit_values": visit_values, "later_values": later_values, "leg_changes": leg_changes}
+    parts = {"visit_value": visit_value, "timeless": timeless}
     path_state = _rebuilt(insertion.path_state, parts)
     evaluate = _rebuilt(insertion.evaluate, parts)
     weigh = _rebuilt(bundle.weigh, {"evaluate": evaluate})

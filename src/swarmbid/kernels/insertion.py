@@ -2,8 +2,7 @@
 
 Timing is physics and stands here: travel, waiting for the window, service, range and the latest
 return. What a visit is worth comes in as coefficients (`swarmbid.scores`), and is evaluated by
-`visit_values`, `later_values` and `leg_changes` alone, so that a user's own function can take their
-place.
+`visit_value` alone, so that a user's own function can stand in its place.
 
 Three rules: HOLD keeps promised times, SHIFT lets later visits slip, APPEND adds at the end only.
 """
@@ -29,6 +28,7 @@ from swarmbid.arrays import (
     HAS_BASE,
     INVERSE_WIDTH,
     LATEST_RETURN,
+    NUM_TASK_ROWS,
     OPEN,
     PEAK,
     RANGE,
@@ -40,54 +40,39 @@ from swarmbid.arrays import (
     Y,
     Z,
 )
-from swarmbid.kernels.lanes import BLOCK, distance_between, distance_lanes, exp_lanes
+from swarmbid.kernels.lanes import (
+    BLOCK,
+    copy_lanes,
+    copy_whole,
+    distance_between,
+    distance_lanes,
+    exp_lane,
+    whole_vectors,
+)
 
 HOLD = 0
 SHIFT = 1
 APPEND = 2
 
-SCRATCH_ROWS = 10
+SCRATCH_ROWS = NUM_TASK_ROWS + 9
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def visit_values(candidates, count, time, leg, cost, power, bits, scale, out):
-    """Score of visits side by side: lane j is column j of `candidates`, begun at time[j] after leg[j] m.
+def visit_value(
+    start, leg, cost, reward, decay, reference, peak, inverse_width, window_start, window_end, duration
+):
+    """Score of one visit that starts at `start` s after a leg of `leg` m.
 
-    `power`, `bits` and `scale` are scratch, as in `exp_lanes`. Writes out[:count].
+    reward * exp(-(decay * (start - reference) + ((start - peak) * inverse_width)^2)) - cost * leg
     """
-    reference, decay = candidates[REFERENCE], candidates[DECAY]
-    peak, inverse_width, reward = candidates[PEAK], candidates[INVERSE_WIDTH], candidates[REWARD]
-    for j in range(count):
-        off = (time[j] - peak[j]) * inverse_width[j]
-        power[j] = -(decay[j] * (time[j] - reference[j]) + off * off)
-    exp_lanes(power, bits, scale, count)
-    for j in range(count):
-        out[j] = reward[j] * power[j] - cost * leg[j]
+    off = (start - peak) * inverse_width
+    return reward * exp_lane(decay * (reference - start) - off * off) - cost * leg
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def later_values(tasks, task, count, time, leg, cost, power, bits, scale, out):
-    """Score of one task's visit if it started at each of time[:count] after leg[j] m."""
-    reference, decay = tasks[REFERENCE, task], tasks[DECAY, task]
-    peak, inverse_width = tasks[PEAK, task], tasks[INVERSE_WIDTH, task]
-    reward = tasks[REWARD, task]
-    if decay > 0.0 or inverse_width > 0.0:
-        for j in range(count):
-            off = (time[j] - peak) * inverse_width
-            power[j] = -(decay * (time[j] - reference) + off * off)
-        exp_lanes(power, bits, scale, count)
-        for j in range(count):
-            out[j] = reward * power[j] - cost * leg[j]
-    else:
-        for j in range(count):
-            out[j] = reward - cost * leg[j]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def leg_changes(tasks, task, start, old_leg, count, leg, cost, out):
-    """What one task's visit gains if its leg becomes leg[:count] m and its start stays."""
-    for j in range(count):
-        out[j] = cost * (old_leg - leg[j])
+def timeless(decay, inverse_width):
+    """Whether the value of a visit does not depend on when it starts."""
+    return decay == 0.0 and inverse_width == 0.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -105,10 +90,7 @@ def path_state(tasks, agent, path, length, hold_times, rule, starts, legs, value
     -------
     Metres flown without the way back.
     """
-    step = agent[DISTANCE_STEP]
-    lane = np.empty((5, 1))
-    scale = lane[4]
-    bits = scale.view(np.int64)
+    step, cost = agent[DISTANCE_STEP], agent[COST_PER_METRE]
     x, y, z = agent[AGENT_X], agent[AGENT_Y], agent[AGENT_Z]
     free = agent[AVAILABLE]
     total = 0.0
@@ -116,12 +98,13 @@ def path_state(tasks, agent, path, length, hold_times, rule, starts, legs, value
         task = path[k]
         leg = distance_between(x, y, z, tasks[X, task], tasks[Y, task], tasks[Z, task], step)
         start = hold_times[k] if rule == HOLD else max(free + leg * agent[SLOWNESS], tasks[READY, task])
-        lane[0, 0] = start
-        lane[1, 0] = leg
-        later_values(tasks, task, 1, lane[0], lane[1], agent[COST_PER_METRE], lane[2], bits, scale, lane[3])
         starts[k] = start
         legs[k] = leg
-        values[k] = lane[3, 0]
+        values[k] = visit_value(
+            start, leg, cost, tasks[REWARD, task], tasks[DECAY, task], tasks[REFERENCE, task],
+            tasks[PEAK, task], tasks[INVERSE_WIDTH, task], tasks[OPEN, task], tasks[END, task],
+            tasks[DURATION, task],
+        )  # fmt: skip
         total += leg
         free = start + tasks[DURATION, task]
         x, y, z = tasks[X, task], tasks[Y, task], tasks[Z, task]
@@ -130,27 +113,31 @@ def path_state(tasks, agent, path, length, hold_times, rule, starts, legs, value
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def evaluate(
-    tasks, candidates, count, agent, path, length, starts, legs, values, total, rule,
-    gain, position, start_time,
-):  # fmt: skip
+    tasks, columns, count, agent, path, length, starts, legs, values, total, rule, gain, position, start_time
+):
     """Best insertion of some tasks into a path; the earliest position wins ties.
 
     Parameters
     ----------
     tasks, agent, path, length : as in `path_state`, which made `starts`, `legs`, `values`, `total`.
-    candidates : float64[NUM_TASK_ROWS, BLOCK], columns of `tasks` side by side; the first `count` count.
+    columns : int64[>= count], the tasks to insert, at most BLOCK of them.
     rule : HOLD, SHIFT or APPEND.
-    gain : float64[count], written; -inf where the task fits nowhere.
-    position : int64[count], written. start_time : float64[count], written, s.
+    gain : float64[>= count], written; -inf where the task fits nowhere.
+    position : int64[>= count], written. start_time : float64[>= count], written, s.
     """
     step = agent[DISTANCE_STEP]
     slowness = agent[SLOWNESS]
     cost = agent[COST_PER_METRE]
-    scratch = np.empty((SCRATCH_ROWS, BLOCK))
-    leg_in, leg_out, home = scratch[0], scratch[1], scratch[2]
-    time, free, score, power = scratch[3], scratch[4], scratch[5], scratch[6]
-    scale, value, same = scratch[7], scratch[8], scratch[9]
-    bits = scale.view(np.int64)
+    farthest = agent[RANGE]
+    latest_return = agent[LATEST_RETURN]
+    # One allocation, rows at fixed offsets: LLVM sees that no two rows overlap and needs no checks.
+    rows = np.empty((SCRATCH_ROWS, BLOCK))
+    xs, ys, zs, end, ready, open_ = rows[X], rows[Y], rows[Z], rows[END], rows[READY], rows[OPEN]
+    duration, reward, reference, decay = rows[DURATION], rows[REWARD], rows[REFERENCE], rows[DECAY]
+    peak, inverse_width = rows[PEAK], rows[INVERSE_WIDTH]
+    leg_in, leg_out, home = rows[NUM_TASK_ROWS], rows[NUM_TASK_ROWS + 1], rows[NUM_TASK_ROWS + 2]
+    time, free, score = rows[NUM_TASK_ROWS + 3], rows[NUM_TASK_ROWS + 4], rows[NUM_TASK_ROWS + 5]
+    best, place, best_time = rows[NUM_TASK_ROWS + 6], rows[NUM_TASK_ROWS + 7], rows[NUM_TASK_ROWS + 8]
 
     back = 0.0
     kept = 0.0
@@ -162,99 +149,132 @@ def evaluate(
                 tasks[X, final], tasks[Y, final], tasks[Z, final],
                 agent[BASE_X], agent[BASE_Y], agent[BASE_Z], step,
             )  # fmt: skip
+    begin = length if rule == APPEND else 0
 
-    open_, ready, end = candidates[OPEN], candidates[READY], candidates[END]
-    duration = candidates[DURATION]
-    best, place, best_time = gain, position, start_time
-    for j in range(count):
+    lanes = whole_vectors(count)
+    for j in range(lanes):
+        task = columns[min(j, count - 1)]  # the lanes left over repeat the last one
+        for row in range(NUM_TASK_ROWS):
+            rows[row, j] = tasks[row, task]
+    for j in range(lanes):
         best[j] = -np.inf
-        place[j] = 0
+        place[j] = 0.0
         best_time[j] = 0.0
         home[j] = 0.0
     if agent[HAS_BASE] > 0.0:
-        distance_lanes(agent[BASE_X], agent[BASE_Y], agent[BASE_Z], candidates, count, step, home)
+        distance_lanes(agent[BASE_X], agent[BASE_Y], agent[BASE_Z], xs, ys, zs, lanes, step, home)
+    x, y, z = agent[AGENT_X], agent[AGENT_Y], agent[AGENT_Z]
+    if begin > 0:
+        before = path[begin - 1]
+        x, y, z = tasks[X, before], tasks[Y, before], tasks[Z, before]
+    distance_lanes(x, y, z, xs, ys, zs, lanes, step, leg_out)
 
-    begin = length if rule == APPEND else 0
     for n in range(begin, length + 1):
         # Leave the previous visit, or the agent's own place.
-        if n == 0:
-            departure = agent[AVAILABLE]
-            distance_lanes(agent[AGENT_X], agent[AGENT_Y], agent[AGENT_Z], candidates, count, step, leg_in)
-        else:
-            before = path[n - 1]
-            departure = starts[n - 1] + tasks[DURATION, before]
-            if n == begin:
-                x, y, z = tasks[X, before], tasks[Y, before], tasks[Z, before]
-                distance_lanes(x, y, z, candidates, count, step, leg_in)
-            else:
-                for j in range(count):
-                    leg_in[j] = leg_out[j]
+        departure = agent[AVAILABLE]
+        if n > 0:
+            departure = starts[n - 1] + tasks[DURATION, path[n - 1]]
+        for j in range(lanes):
+            leg_in[j] = leg_out[j]
         if n < length:
             after = path[n]
             distance_lanes(
-                tasks[X, after], tasks[Y, after], tasks[Z, after], candidates, count, step, leg_out
+                tasks[X, after], tasks[Y, after], tasks[Z, after], xs, ys, zs, lanes, step, leg_out
             )
 
-        if rule == HOLD:
-            promised = starts[n] if n < length else np.inf
-            for j in range(count):
+        if rule == HOLD and n < length:
+            # Promised times hold: the visit after keeps its start, and only its leg changes.
+            promised, lost = starts[n], values[n]
+            open_n, end_n, duration_n = tasks[OPEN, after], tasks[END, after], tasks[DURATION, after]
+            reward_n, reference_n, decay_n = (
+                tasks[REWARD, after],
+                tasks[REFERENCE, after],
+                tasks[DECAY, after],
+            )
+            peak_n, inverse_width_n = tasks[PEAK, after], tasks[INVERSE_WIDTH, after]
+            for j in range(lanes):
                 earliest = max(departure + leg_in[j] * slowness, open_[j])
-                latest = end[j]
-                if n < length:
-                    latest = min(latest, promised - duration[j] - leg_out[j] * slowness)
-                time[j] = max(earliest, min(ready[j], latest))
-                score[j] = 0.0 if earliest <= latest else -np.inf
-        else:
-            for j in range(count):
-                chosen = max(departure + leg_in[j] * slowness, ready[j])
-                time[j] = chosen
-                score[j] = 0.0 if chosen <= end[j] else -np.inf
-        visit_values(candidates, count, time, leg_in, cost, power, bits, scale, value)
-        for j in range(count):
-            score[j] = score[j] + value[j]
-            free[j] = time[j] + duration[j]
-
-        if n < length and rule == SHIFT:
-            travel = leg_out
-            for k in range(n, length):
-                task = path[k]
-                ready_k, end_k, duration_k = tasks[READY, task], tasks[END, task], tasks[DURATION, task]
-                if k > n:
-                    travel = same
-                    for j in range(count):
-                        same[j] = legs[k]
-                lost = values[k]
-                for j in range(count):
-                    later = max(free[j] + travel[j] * slowness, ready_k)
-                    free[j] = later
-                    score[j] = (score[j] if later <= end_k else -np.inf) - lost
-                later_values(tasks, task, count, free, travel, cost, power, bits, scale, value)
-                for j in range(count):
-                    score[j] = score[j] + value[j]
-                    free[j] = free[j] + duration_k
-        elif n < length:
-            # Promised times hold, so the visit after keeps its start and only its leg changes.
-            leg_changes(tasks, path[n], starts[n], legs[n], count, leg_out, cost, value)
-            for j in range(count):
-                score[j] = score[j] + value[j]
+                latest = min(end[j], promised - duration[j] - leg_out[j] * slowness)
+                start = max(earliest, min(ready[j], latest))
+                value = visit_value(
+                    start, leg_in[j], cost, reward[j], decay[j], reference[j], peak[j], inverse_width[j],
+                    open_[j], end[j], duration[j],
+                )  # fmt: skip
+                value_n = visit_value(
+                    promised, leg_out[j], cost, reward_n, decay_n, reference_n, peak_n, inverse_width_n,
+                    open_n, end_n, duration_n,
+                )  # fmt: skip
+                time[j] = start
                 free[j] = kept
+                score[j] = (value if earliest <= latest else -np.inf) + (value_n - lost)
+        else:
+            for j in range(lanes):
+                start = max(departure + leg_in[j] * slowness, ready[j])
+                value = visit_value(
+                    start, leg_in[j], cost, reward[j], decay[j], reference[j], peak[j], inverse_width[j],
+                    open_[j], end[j], duration[j],
+                )  # fmt: skip
+                time[j] = start
+                free[j] = start + duration[j]
+                score[j] = value if start <= end[j] else -np.inf
+
+        for k in range(n, length if rule == SHIFT else n):
+            task = path[k]
+            lost, leg_k, travel_k = values[k], legs[k], legs[k] * slowness
+            ready_k, open_k, end_k = tasks[READY, task], tasks[OPEN, task], tasks[END, task]
+            duration_k, reward_k = tasks[DURATION, task], tasks[REWARD, task]
+            reference_k, decay_k = tasks[REFERENCE, task], tasks[DECAY, task]
+            peak_k, inverse_width_k = tasks[PEAK, task], tasks[INVERSE_WIDTH, task]
+            if k == n:
+                for j in range(lanes):
+                    start = max(free[j] + leg_out[j] * slowness, ready_k)
+                    value = visit_value(
+                        start, leg_out[j], cost, reward_k, decay_k, reference_k, peak_k, inverse_width_k,
+                        open_k, end_k, duration_k,
+                    )  # fmt: skip
+                    before_k = score[j]
+                    score[j] = (before_k if start <= end_k else -np.inf) + (value - lost)
+                    free[j] = start + duration_k
+            elif timeless(decay_k, inverse_width_k):
+                for j in range(lanes):
+                    start = max(free[j] + travel_k, ready_k)
+                    before_k = score[j]
+                    score[j] = before_k if start <= end_k else -np.inf
+                    free[j] = start + duration_k
+            else:
+                for j in range(lanes):
+                    start = max(free[j] + travel_k, ready_k)
+                    value = visit_value(
+                        start, leg_k, cost, reward_k, decay_k, reference_k, peak_k, inverse_width_k,
+                        open_k, end_k, duration_k,
+                    )  # fmt: skip
+                    before_k = score[j]
+                    score[j] = (before_k if start <= end_k else -np.inf) + (value - lost)
+                    free[j] = start + duration_k
 
         # Range and the latest return, the way back included.
+        here = float(n)
         if n < length:
-            for j in range(count):
-                flown = total - legs[n] + leg_in[j] + leg_out[j] + back
-                done = free[j] + back * slowness
-                fits = flown <= agent[RANGE] and done <= agent[LATEST_RETURN]
-                score[j] = score[j] if fits else -np.inf
+            flown = total - legs[n] + back
+            way_back = back * slowness
+            for j in range(lanes):
+                new, new_time, free_j = score[j], time[j], free[j]
+                old, old_place, old_time = best[j], place[j], best_time[j]
+                far, late = flown + leg_in[j] + leg_out[j], free_j + way_back
+                better = (new > old) & (far <= farthest) & (late <= latest_return)
+                best[j] = new if better else old
+                place[j] = here if better else old_place
+                best_time[j] = new_time if better else old_time
         else:
-            for j in range(count):
-                flown = total + leg_in[j] + home[j]
-                done = free[j] + home[j] * slowness
-                fits = flown <= agent[RANGE] and done <= agent[LATEST_RETURN]
-                score[j] = score[j] if fits else -np.inf
+            for j in range(lanes):
+                new, new_time, free_j, home_j = score[j], time[j], free[j], home[j]
+                old, old_place, old_time = best[j], place[j], best_time[j]
+                far, late = total + leg_in[j] + home_j, free_j + home_j * slowness
+                better = (new > old) & (far <= farthest) & (late <= latest_return)
+                best[j] = new if better else old
+                place[j] = here if better else old_place
+                best_time[j] = new_time if better else old_time
 
-        for j in range(count):
-            better = score[j] > best[j]
-            best[j] = score[j] if better else best[j]
-            place[j] = n if better else place[j]
-            best_time[j] = time[j] if better else best_time[j]
+    copy_lanes(best, gain, count)
+    copy_lanes(best_time, start_time, count)
+    copy_whole(place, position, count)
