@@ -265,11 +265,7 @@ def plug_ins() -> str:
         NOTE + "# Names\n\nWhat `swarmbid list` lists, and the words of a plan and of its check.\n",
     ]
     for folder in ("algorithms", "scores", "scenarios", "references", "datasets"):
-        found = [
-            (f"`{name}`", registry.summary(folder, name))
-            for name in registry.names(folder)
-            if not (folder == "scores" and name == "custom")
-        ]
+        found = [(f"`{name}`", registry.summary(folder, name)) for name in registry.names(folder)]
         parts.append(f"\n## {folder.capitalize()}\n\n" + _table(("name", "what it is"), found))
         if folder == "scores":
             parts.append("\n" + _table(("score", "option", "default"), _score_options()))
@@ -283,8 +279,6 @@ def plug_ins() -> str:
 def _score_options() -> list[tuple[str, str, str]]:
     rows = []
     for name in registry.names("scores"):
-        if name == "custom":
-            continue
         cls: Any = registry.load_class("scores", name, Score)
         rows += [(f"`{name}`", f"`{option.name}`", f"`{option.default}`") for option in fields(cls)]
     return rows

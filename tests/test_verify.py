@@ -14,7 +14,7 @@ from generators import random_mission
 from swarmbid.model import Agent, Mission, Task
 from swarmbid.plan import AgentPlan, Plan, make_plan
 from swarmbid.scores import make_score
-from swarmbid.scores.custom import Custom
+from swarmbid.scores._custom import Custom
 from swarmbid.unserved import Unserved
 from swarmbid.verify import RULES, Violation, verify
 

@@ -51,7 +51,7 @@ NUM_AGENT_SLOTS = 13
 
 
 class VisitRecord(NamedTuple):
-    """What a user's own score may look at (`swarmbid.scores.custom`).
+    """What a user's own score may look at (`swarmbid.scores._custom`).
 
     Parameters
     ----------

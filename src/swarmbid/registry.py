@@ -6,9 +6,11 @@ to edit. Packages of other people join through the entry point group ``swarmbid.
 
 from __future__ import annotations
 
+import ast
 import importlib
 import pkgutil
 from importlib.metadata import entry_points
+from pathlib import Path
 from types import ModuleType
 from typing import TypeVar
 
@@ -75,9 +77,12 @@ def load_class(folder: str, name: str, base: type[T]) -> type[T]:
 
 
 def summary(folder: str, name: str) -> str:
-    """Return the first line of the plug-in's docstring."""
-    text = load(folder, name).__doc__ or ""
-    return text.strip().split("\n")[0]
+    """Return the first line of the plug-in's docstring; one of our own is read, not imported."""
+    file = Path(importlib.import_module(f"swarmbid.{folder}").__path__[0], f"{name}.py")
+    text = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) if file.is_file() else None
+    if text is None:
+        text = load(folder, name).__doc__
+    return (text or "").strip().split("\n")[0]
 
 
 def _one_of(known: list[str]) -> str:

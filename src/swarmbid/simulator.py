@@ -12,7 +12,6 @@ import heapq
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -25,20 +24,15 @@ from swarmbid.kernels import wire
 from swarmbid.messages import Counts, Message, decode, encode, encoded_size
 from swarmbid.missionfile import mission_to_dict
 from swarmbid.model import Mission
-from swarmbid.negotiator import Event, Negotiator
+from swarmbid.negotiator import Negotiator
 from swarmbid.network import Network, make_topology
 from swarmbid.plan import Plan, make_plan
 from swarmbid.rng import stream
-from swarmbid.scores import Score, make_score
+from swarmbid.scores import INSERTIONS, Score, make_score
 from swarmbid.trace import EVENT_RECORDS, Header, Result, Sent, TraceWriter
 
 MODES = ("rounds", "asynchronous")
 MOST_DISAGREEMENTS = 100
-THREADS = 2
-THREADS_FROM = 200
-"""Agents from which on they are served by threads: below, handing over costs more than it brings."""
-CHUNK = 25
-"""Agents that a thread serves in a row."""
 EPSILON = 1e-9
 """s, the least time between two ticks of an agent."""
 
@@ -131,9 +125,10 @@ def simulate(
     """
     found = make_score(score)
     rule = insertion or found.insertion
-    if mode not in MODES:
-        mend = "Choose one of: " + ", ".join(MODES) + "."
-        raise InputError([Fault("simulation", "mode", f"is {mode!r}", mend)])
+    for name, chosen, known in (("mode", mode, MODES), ("insertion", rule, INSERTIONS)):
+        if chosen not in known:
+            mend = "Choose one of: " + ", ".join(known) + "."
+            raise InputError([Fault("simulation", name, f"is {chosen!r}", mend)])
     cls = registry.load_class("algorithms", algorithm, Negotiator)  # type: ignore[type-abstract]
     reasons = cls.unsupported(mission)
     if reasons:
@@ -185,21 +180,6 @@ def simulate(
     return run
 
 
-class _Visit:
-    """One agent's part of an instant: what arrived, and what came of it."""
-
-    __slots__ = ("decided", "due", "events", "messages", "received", "row", "said", "ticked")
-
-    def __init__(self, row: int, messages: list[Message]) -> None:
-        self.row = row
-        self.messages = messages
-        self.said: list[Message] = []
-        self.events: list[Event] = []
-        self.ticked = False
-        self.due = math.inf
-        self.received = self.decided = 0
-
-
 class _Run:
     """The event heap and what is counted on the way."""
 
@@ -229,8 +209,6 @@ class _Run:
         self._last_bid_round = 0
         self._messages = self._bytes = self._entries = 0
         self._dropped: Counter[str] = Counter()
-        many = len(negotiators) >= THREADS_FROM
-        self._pool = ThreadPoolExecutor(THREADS) if many else None
         phases = stream(seed, "phases").random(len(negotiators)).tolist()
         first = [0.0] * len(negotiators) if mode == "rounds" else phases
         self._next = list(first)
@@ -282,9 +260,8 @@ class _Run:
     def _instant(self) -> bool:
         """Everything that happens at the next instant; return whether anybody ticked.
 
-        What is sent now arrives later, so agents can be served one after the other, or side by side: each
-        takes in its messages and ticks while its beliefs are at hand in the processor's cache. What
-        they say is carried away in order of row, so that threads change nothing.
+        What is sent now arrives later, so agents can be served one after the other: each takes in its
+        messages and ticks while its beliefs are at hand in the processor's cache.
         """
         now = self.now = self._heap[0][0]
         arrived: dict[int, list[Message]] = {}
@@ -295,69 +272,55 @@ class _Run:
                     arrived.setdefault(row, []).append(message)
                 elif self._next[row] == now:
                     arrived.setdefault(row, [])
-        visits = [_Visit(row, arrived[row]) for row in sorted(arrived)]
-        if self._pool is None:
-            for visit in visits:
-                self._serve(visit)
-        else:
-            chunks = [visits[first : first + CHUNK] for first in range(0, len(visits), CHUNK)]
-            for _ in self._pool.map(self._serve_all, chunks):
-                pass
         ticked = False
-        for visit in visits:
-            ticked |= visit.ticked
-            self._note(visit)
+        for row in sorted(arrived):
+            ticked |= self._serve(row, arrived[row])
         return ticked
 
-    def _serve_all(self, visits: list[_Visit]) -> None:
-        for visit in visits:
-            self._serve(visit)
-
-    def _serve(self, visit: _Visit) -> None:
-        """Let one agent take in its messages and tick if it is due. Touches nothing but that agent."""
-        one, now = self.negotiators[visit.row], self.now
-        for message in visit.messages:
+    def _serve(self, row: int, messages: list[Message]) -> bool:
+        """Let one agent take in its messages, and tick if it is due; return whether it did."""
+        one, now = self.negotiators[row], self.now
+        for message in messages:
             one.receive(message, now)
-        wake = one.next_tick()
-        due = math.inf if wake is None else max(self._at(wake), now)
-        due = min(due, self._next[visit.row])
         # What changed since the last tick came in messages of rounds that are over.
-        visit.received = one.digest
-        visit.ticked = due <= now
-        if visit.ticked:
-            visit.said = one.tick(now)
-            wake = one.next_tick()
-            due = math.inf if wake is None else self._at(max(wake, now + EPSILON))
-        visit.due = due
-        visit.events = one.events()
-        visit.decided = one.digest
+        self._note_change(row, math.ceil(now))
+        due: float = min(self._next[row], max(self._at(one.next_tick()), now))
+        ticked = due <= now
+        said: list[Message] = []
+        if ticked:
+            said = one.tick(now)
+            self._note_change(row, math.floor(now) + 1)
+            due = self._at(one.next_tick(), after=now)
+        if ticked or due != self._next[row]:
+            self._next[row] = due
+            if math.isfinite(due):
+                self._push(due, None, (row,))
+        self._note_events(one)
+        for message in said:
+            self._send(row, message)
+        return ticked
 
-    def _note(self, visit: _Visit) -> None:
-        """Count what an agent did, record it, and carry away what it said."""
-        row, now = visit.row, self.now
-        if visit.due != self._next[row] or visit.ticked:
-            self._next[row] = visit.due
-            if math.isfinite(visit.due):
-                self._push(visit.due, None, (row,))
-        round_ = math.floor(now) + 1
-        for digest, when in ((visit.received, math.ceil(now)), (visit.decided, round_)):
-            if digest != self._digests[row]:
-                self._digests[row] = digest
-                self._changed_round = max(self._changed_round, when)
-                self._changed_at = now
-        agent_id = self.negotiators[row].agent_id
-        for event in visit.events:
+    def _note_change(self, row: int, round_: int) -> None:
+        digest = self.negotiators[row].digest
+        if digest != self._digests[row]:
+            self._digests[row] = digest
+            self._changed_round = max(self._changed_round, round_)
+            self._changed_at = self.now
+
+    def _note_events(self, one: Negotiator) -> None:
+        for event in one.events():
             if event.kind == "taken":
-                self._last_bid_round = max(self._last_bid_round, round_)
+                self._last_bid_round = max(self._last_bid_round, math.floor(self.now) + 1)
             elif event.kind == "dropped":
                 self._dropped[vars(event)["reason"]] += 1
             if self.writer is not None:
-                self.writer.write(EVENT_RECORDS[event.kind](t=now, agent=agent_id, **vars(event)))
-        for message in visit.said:
-            self._send(row, message)
+                self.writer.write(EVENT_RECORDS[event.kind](t=self.now, agent=one.agent_id, **vars(event)))
 
-    def _at(self, time: float) -> float:
-        """When a tick wanted at `time` can be had: in rounds mode at the next whole round."""
+    def _at(self, wanted: float | None, after: float = -math.inf) -> float:
+        """When a tick wanted at some time can be had: later than `after`, in whole rounds in rounds mode."""
+        if wanted is None:
+            return math.inf
+        time = max(wanted, after + EPSILON)
         return float(math.ceil(time)) if self.mode == "rounds" and math.isfinite(time) else time
 
     def _send(self, row: int, message: Message) -> None:

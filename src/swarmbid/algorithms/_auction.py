@@ -79,7 +79,7 @@ class ConsensusAuction(Negotiator):
         stamps: str = "originator",
         period: float = 1.0,
         heartbeat: float = 10.0,
-        full_every: int = 50,
+        full_every: int = 200,
         idle_every: int = 4,
         incarnation: int = 1,
     ) -> None:

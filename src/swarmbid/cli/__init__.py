@@ -7,6 +7,7 @@ rule (said which); 2 bad input or usage.
 from __future__ import annotations
 
 import os
+import signal
 import sys
 
 import typer
@@ -49,16 +50,13 @@ def _root(
 
 def main() -> None:
     """Run the command line; every failure ends in words and a status, never in a traceback."""
+    if hasattr(signal, "SIGPIPE"):
+        # When the reader (say, `head`) has had enough, end as other tools do.
+        signal.signal(signal.SIGPIPE, signal.SIG_DFL)
     try:
         status = app(standalone_mode=False)
     except InputError as error:
         status = complain(str(error), 2)
-    except KeyboardInterrupt:
-        status = complain("stopped", 130)
-    except BrokenPipeError:
-        # The reader (say, `head`) has had enough. Let the interpreter's last flush go nowhere.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        status = 0
     except Exception as error:
         status = _unforeseen(error)
     sys.exit(status if isinstance(status, int) else 0)
@@ -69,6 +67,9 @@ def _unforeseen(error: Exception) -> int:
     status = getattr(error, "exit_code", None)
     if isinstance(status, int):
         message = getattr(error, "format_message", lambda: "")()
+        if message.startswith("Usage:"):  # nothing was typed: the help is the answer
+            typer.echo(message)
+            return status
         return complain(message, status) if message else status
     if os.environ.get("SWARMBID_DEBUG"):
         raise error

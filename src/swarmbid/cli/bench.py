@@ -29,7 +29,7 @@ def bench(
         say_json(result.to_dict())
     else:
         headings, rows = result.table(every_instance=every)
-        say_table(headings, rows)
+        say_table(headings, rows, text=(0,))
         say("", result.summary())
     if write is not None:
         write_text(write, result.page())

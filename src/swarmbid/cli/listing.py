@@ -18,4 +18,4 @@ def list_(as_json: AsJson = False) -> None:
     if as_json:
         say_json(found)
     else:
-        say_table(["kind", "name", "what it is"], [list(entry.values()) for entry in found], left=3)
+        say_table(["kind", "name", "what it is"], [list(entry.values()) for entry in found], text=(0, 1, 2))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -29,12 +29,12 @@ def say_json(data: Any) -> None:
     print(json.dumps(data, indent=2, ensure_ascii=False))
 
 
-def say_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, left: int = 1) -> None:
-    """Print a table: with lines and colours on a terminal, plain and of fixed width elsewhere.
+def say_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, text: Collection[int]) -> None:
+    """Print a table: with bold headings on a terminal, plain and of fixed width elsewhere.
 
     Parameters
     ----------
-    left : how many columns, counted from the first, are text; the others are numbers, set right.
+    text : the columns that are text, set left; the others are numbers, set right.
     """
     cells = [list(row) for row in rows]
     if sys.stdout.isatty():
@@ -43,7 +43,7 @@ def say_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, left: i
 
         table = Table(header_style="bold", box=None, pad_edge=False, padding=(0, 2, 0, 0))
         for place, heading in enumerate(headings):
-            table.add_column(heading, justify="left" if place < left else "right", overflow="fold")
+            table.add_column(heading, justify="left" if place in text else "right", overflow="fold")
         for row in cells:
             table.add_row(*row)
         Console(markup=False, highlight=False).print(table)
@@ -51,10 +51,25 @@ def say_table(headings: Sequence[str], rows: Iterable[Sequence[str]], *, left: i
     widths = [max(len(row[k]) for row in [list(headings), *cells]) for k in range(len(headings))]
     for row in [list(headings), *cells]:
         parts = [
-            text.ljust(width) if k < left else text.rjust(width)
-            for k, (text, width) in enumerate(zip(row, widths, strict=True))
+            cell.ljust(width) if k in text else cell.rjust(width)
+            for k, (cell, width) in enumerate(zip(row, widths, strict=True))
         ]
         print("  ".join(parts).rstrip())
+
+
+def count_of(number: int, thing: str) -> str:
+    """Return "1 task", "2 tasks", "1,000 tasks"."""
+    return f"{number:,} {thing}" + ("" if number == 1 else "s")
+
+
+def shortened(words: Iterable[str], width: int) -> str:
+    """Return as many words as fit, and "..." for the rest."""
+    line = ""
+    for word in words:
+        if len(line) + len(word) + 1 > width - 4:
+            return f"{line} ...".strip()
+        line = f"{line} {word}" if line else word
+    return line
 
 
 @contextmanager
@@ -101,9 +116,13 @@ def check_writable(*paths: Path | None) -> None:
     InputError : naming each.
     """
     faults = []
+    seen: set[Path] = set()
     for path in paths:
         if path is None:
             continue
+        if path.resolve() in seen:
+            faults.append(Fault(str(path), "", "is named for two outputs", "Give each a file of its own."))
+        seen.add(path.resolve())
         if path.is_dir():
             faults.append(Fault(str(path), "", "is a directory", "Give the path of a file in it."))
         elif not path.parent.is_dir():

@@ -46,6 +46,7 @@ def plan(
     from swarmbid.cli.running import carry_out
     from swarmbid.missionfile import load_mission
 
+    check_writable(output, report)
     first = output or report
     if trace is None and first is not None:
         trace = first.with_suffix(".trace.jsonl")

@@ -6,8 +6,11 @@ import json
 from pathlib import Path
 from typing import Any
 
-from swarmbid.cli.output import complain, say, say_json, say_table, write_text
+from swarmbid.cli.output import complain, count_of, say, say_json, say_table, shortened, write_text
 from swarmbid.model import Mission
+
+PATH_WIDTH = 60
+MOST_UNSERVED = 20
 
 
 def carry_out(
@@ -55,9 +58,12 @@ def carry_out(
     if not run.converged:
         problems.append(f"the agents did not agree: {run.reason}")
     if plan.unserved:
-        problems.append(f"{len(plan.unserved)} of {len(mission.tasks)} tasks are not served")
+        tasks = count_of(len(mission.tasks), "task")
+        problems.append(
+            f"{len(plan.unserved)} of {tasks} {'is' if len(plan.unserved) == 1 else 'are'} not served"
+        )
     if violations:
-        problems.append(f"the plan breaks {len(violations)} rules; the first: {violations[0]}")
+        problems.append(f"the plan breaks {count_of(len(violations), 'rule')}; the first: {violations[0]}")
     figures = {
         "status": run.status,
         "reason": run.reason,
@@ -81,54 +87,55 @@ def carry_out(
             }
         )
     else:
-        _tell(mission, run, plan, problems)
+        _tell(mission, run, plan)
         _tell_files(plan_file, report, trace, plan)
     for problem in problems:
         complain(problem, 1)
     return 1 if problems else 0
 
 
-def _tell(mission: Mission, run: Any, plan: Any, problems: list[str]) -> None:
+def _tell(mission: Mission, run: Any, plan: Any) -> None:
     served = len(mission.tasks) - len(plan.unserved)
     agreed = (
-        f"agreed in {run.rounds} rounds, known to all after {run.declared_round}"
+        f"agreed in {count_of(run.rounds, 'round')}, known to all after {run.declared_round}"
         if run.converged
         else "NOT AGREED"
     )
-    say(
-        f"{mission.name}: {served} of {len(mission.tasks)} tasks served by {len(mission.agents)} agents; {agreed}."
-    )
+    team = f"{served} of {count_of(len(mission.tasks), 'task')} served by"
+    say(f"{mission.name}: {team} {count_of(len(mission.agents), 'agent')}; {agreed}.")
     honest = (
         "" if plan.honest_score == plan.total_score else f" ({plan.honest_score:,.6g} with every leg once)"
     )
     say(
         f"Score {plan.total_score:,.6g}{honest} by {run.algorithm}, {run.score.name}, {run.insertion}; "
-        f"{run.messages:,} messages, {run.bytes:,} bytes."
+        f"{count_of(run.messages, 'message')}, {count_of(run.bytes, 'byte')}."
     )
-    say("")
-    say_table(
-        ["agent", "tasks", "km", "done at s", "score", "path"],
-        [
+    if plan.agents:
+        say("")
+        say_table(
+            ["agent", "tasks", "km", "done at s", "score", "path"],
             [
-                one.agent,
-                str(len(one.visits)),
-                f"{one.distance / 1000.0:.2f}",
-                f"{one.finish:.0f}" if one.visits else "-",
-                f"{one.score:.2f}",
-                " ".join(visit.task for visit in one.visits[:6]) + (" ..." if len(one.visits) > 6 else ""),
-            ]
-            for one in plan.agents
-        ],
-    )
+                [
+                    one.agent,
+                    str(len(one.visits)),
+                    f"{one.distance / 1000.0:.2f}",
+                    f"{one.finish:.0f}" if one.visits else "-",
+                    f"{one.score:.2f}",
+                    shortened((visit.task for visit in one.visits), PATH_WIDTH),
+                ]
+                for one in plan.agents
+            ],
+            text=(0, 5),
+        )
     if plan.unserved:
         say("", "Not served:")
         say_table(
             ["task", "reason", "detail"],
-            [[left.task, left.reason, left.detail] for left in plan.unserved[:20]],
-            left=3,
+            [[left.task, left.reason, left.detail] for left in plan.unserved[:MOST_UNSERVED]],
+            text=(0, 1, 2),
         )
-        if len(plan.unserved) > 20:
-            say(f"and {len(plan.unserved) - 20} more; the plan file and the report have them all.")
+        if len(plan.unserved) > MOST_UNSERVED:
+            say(f"and {len(plan.unserved) - MOST_UNSERVED} more; the plan and the report have them all.")
 
 
 def _tell_files(plan_file: Path | None, report: Path | None, trace: Path | None, plan: Any) -> None:

@@ -51,13 +51,13 @@ FIRST_BATCH = 32
 """Tasks evaluated before the bound is looked at again; doubled until a block is full."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def outbids(bid, rank, other_bid, other_rank):
     """The one order of bids: the higher bid; among equal bids the higher agent id (its rank here)."""
     return bid > other_bid or (bid == other_bid and rank > other_rank)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def eligible(gain, ceiling, rank, bid_to_beat, rank_to_beat):
     """Whether a bid of min(gain, ceiling) wins the task, or the agent holds it anyway (h_ij)."""
     bid = min(gain, ceiling)
@@ -66,7 +66,7 @@ def eligible(gain, ceiling, rank, bid_to_beat, rank_to_beat):
     return rank_to_beat == rank or outbids(bid, rank, bid_to_beat, rank_to_beat)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def before(gain, opens, task, best_gain, best_opens, best):
     """The one order of an agent's own candidates: larger gain, earlier window, smaller row."""
     if gain != best_gain:
@@ -74,7 +74,7 @@ def before(gain, opens, task, best_gain, best_opens, best):
     return opens < best_opens or (opens == best_opens and task < best)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def bounds(tasks, fixed, agent, out):
     """The most that each task can ever gain this agent, whatever is in its path.
 
@@ -106,7 +106,7 @@ def bounds(tasks, fixed, agent, out):
         out[j] = bound if max(direct, tasks[OPEN, j]) <= tasks[END, j] * (1.0 + 1e-12) else -np.inf
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def weigh(
     tasks, fixed, agent, path, length, starts, legs, values, total, rule, rank, ceiling,
     bid_to_beat, rank_to_beat, ranking, gain, extent, batch, count, columns, gains, position, start_time,
@@ -134,7 +134,7 @@ def weigh(
     return best, best_gain, best_opens
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def worth_weighing(changed, rank, bid_to_beat, rank_to_beat, bound, place_of, order, length):
     """Which tasks with changed bids could enter the bundle, and whether it has to be built at all.
 
@@ -162,7 +162,7 @@ def worth_weighing(changed, rank, bid_to_beat, rank_to_beat, bound, place_of, or
     return found[:count], build
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def build_bundle(
     tasks, fixed, agent, rank, rule, warped, bid_to_beat, rank_to_beat,
     kept, known, length, changed, bound, ranking, place_of, gain, extent, order, marks,

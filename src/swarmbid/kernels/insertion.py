@@ -57,7 +57,7 @@ APPEND = 2
 SCRATCH_ROWS = NUM_TASK_ROWS + 9
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def visit_value(
     start, leg, cost, reward, decay, reference, peak, inverse_width, window_start, window_end, duration
 ):
@@ -69,13 +69,13 @@ def visit_value(
     return reward * exp_lane(decay * (reference - start) - off * off) - cost * leg
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def timeless(decay, inverse_width):
     """Whether the value of a visit does not depend on when it starts."""
     return decay == 0.0 and inverse_width == 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def path_state(tasks, agent, path, length, hold_times, rule, starts, legs, values):
     """Times, legs and values along a path; what `evaluate` builds on.
 
@@ -111,7 +111,7 @@ def path_state(tasks, agent, path, length, hold_times, rule, starts, legs, value
     return total
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def evaluate(
     tasks, columns, count, agent, path, length, starts, legs, values, total, rule, gain, position, start_time
 ):

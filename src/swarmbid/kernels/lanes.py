@@ -23,7 +23,7 @@ _ROUND = 6755399441055744.0  # 1.5 * 2^52: adding it rounds to the nearest integ
 _TO_EXPONENT = np.int64(52)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def exp_lane(exponent):
     """Return e to the `exponent`, clamped to [-708, 708], to within a unit in the last place or two.
 
@@ -49,13 +49,13 @@ def exp_lane(exponent):
     return np.int64(bits).view(np.float64)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def whole_vectors(count):
     """Return how many lanes to work on for `count` tasks, so that no loop ends in scalar code."""
     return (count + 7) // 8 * 8
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def copy_lanes(values, out, count):
     """Copy `count` lanes.
 
@@ -66,14 +66,14 @@ def copy_lanes(values, out, count):
         out[j] = values[j]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def copy_whole(values, out, count):
     """Copy `count` lanes that hold whole numbers to integers."""
     for j in range(count):
         out[j] = np.int64(values[j])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def distance_lanes(x, y, z, xs, ys, zs, count, step, out):
     """Distances in m from one point to a block of tasks, rounded down to `step` if it is not 0."""
     for j in range(count):
@@ -86,7 +86,7 @@ def distance_lanes(x, y, z, xs, ys, zs, count, step, out):
             out[j] = np.floor(out[j] / step + 1e-9) * step
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def distance_between(ax, ay, az, bx, by, bz, step):
     """Metres between two points, with the same arithmetic as `distance_lanes`."""
     dx = bx - ax

@@ -12,7 +12,7 @@ from swarmbid.arrays import NO_AGENT
 from swarmbid.kernels.consensus import NOT_LISTED, TO_SEND, take_flagged
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def compose(full, winner, bid, flags, heard, told):
     """Return the columns of the next message, and mark its tasks as sent.
 
@@ -46,7 +46,7 @@ def compose(full, winner, bid, flags, heard, told):
     return tasks, winners, bids, stamps
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def spread(stamps):
     """Largest less smallest of the stamps that are listed, and how many are."""
     low, high, count = np.int64(0), np.int64(0), 0
@@ -59,7 +59,7 @@ def spread(stamps):
     return high - low, count
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True)
 def count_columns(heard, tasks, winners, agreed, asked, left, agent_lengths, task_lengths):
     """What the size of a message follows from.
 

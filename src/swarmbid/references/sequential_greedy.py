@@ -44,8 +44,8 @@ def sequential_greedy(
 ) -> GreedyResult:
     """Give away one task after the other, each time to the highest bid.
 
-    Every agent offers its largest gain (ties: the smallest task id), warped to its previous bid at
-    most; the highest offer wins (ties: the highest agent id).
+    Every agent offers its largest gain (ties: earlier window, then smaller task id), warped to its
+    previous bid at most; the highest offer wins (ties: the highest agent id).
 
     Parameters
     ----------

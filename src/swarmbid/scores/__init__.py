@@ -76,7 +76,10 @@ class Score(ABC):
         return None
 
     def diminishing(self, insertion: str) -> bool:
-        """Whether gains never rise as the bundle grows, so that the theorems of CBBA hold unwarped."""
+        """Whether gains never rise as the bundle grows, so that the theorems of CBBA hold unwarped.
+
+        For exact distances: a `Mission.distance_step` breaks the triangle inequality, and with it this.
+        """
         return False
 
     def honest(self) -> Score:
@@ -104,12 +107,12 @@ def make_score(score: str | Score | Callable[..., float] | None = None, **option
     if isinstance(score, Score):
         return score
     if callable(score):
-        from swarmbid.scores.custom import Custom
+        from swarmbid.scores._custom import Custom
 
         return Custom(score)
     name = score or "time_discounted"
     if name.endswith(".py"):
-        from swarmbid.scores.custom import load_custom
+        from swarmbid.scores._custom import load_custom
 
         return load_custom(Path(name))
     cls = registry.load_class("scores", name, Score)  # type: ignore[type-abstract]

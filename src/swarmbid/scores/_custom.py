@@ -3,8 +3,9 @@
     def score(visit):
         return visit.reward * 0.5 ** (visit.start / 600.0) - 0.01 * visit.leg
 
-It gets a `VisitRecord` and returns score units. It is compiled into the kernel (once, about two seconds), so
-it may use arithmetic and `math`, nothing else; the same function runs uncompiled when a plan is checked.
+It gets a `VisitRecord` and returns score units. It is compiled into the kernel, once a process and for some
+seconds, so it may use arithmetic and `math`, nothing else; the same function runs uncompiled when a plan
+is checked.
 """
 
 from __future__ import annotations
@@ -33,6 +34,11 @@ class Custom(Score):
 
     function: Callable[[VisitRecord], float]
     source: str = ""
+
+    @property
+    def name(self) -> str:
+        """The same for every such score."""
+        return "custom"
 
     @property
     def options(self) -> dict[str, Any]:
