@@ -54,5 +54,8 @@ class Fault:
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Return "Did you mean 'x'?" for the nearest of `known`, or an empty string."""
-    near = difflib.get_close_matches(name, list(known), n=1)
+    names = sorted(known)
+    # What was cut short is more likely meant than what looks alike.
+    near = [one for one in names if name and one.startswith(name)][:1]
+    near = near or difflib.get_close_matches(name, names, n=1)
     return f"Did you mean {near[0]!r}?" if near else ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -16,7 +17,7 @@ from swarmbid import cli
 from swarmbid.plan import Plan
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-QUICKSTART = str(EXAMPLES / "quickstart.yaml")
+QUICKSTART = "quickstart.yaml"
 
 
 class Typed:
@@ -28,8 +29,9 @@ class Typed:
 
 @pytest.fixture
 def swarmbid(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path):
-    """Run one command in this process, in an empty directory."""
+    """Run one command in this process, in a directory that holds a copy of the small mission only."""
     monkeypatch.chdir(tmp_path)
+    shutil.copy(EXAMPLES / QUICKSTART, tmp_path)
 
     def run(*words: str) -> Typed:
         monkeypatch.setattr(sys, "argv", ["swarmbid", *words])
@@ -131,6 +133,8 @@ WRONG = {
     "plan QUICK -o no/p.json": "no/p.json: lies in no, which is no directory. Make it first.",
     "plan QUICK -o .": ".: is a directory. Give the path of a file in it.",
     "plan QUICK -o a.json --report a.json": "a.json: is named for two outputs.",
+    "plan QUICK -o QUICK": "quickstart.yaml: is the input. Give the output a file of its own.",
+    "simulate QUICK --trace QUICK": "quickstart.yaml: is the input.",
     "plan QUICK -s nothing": "there is no score 'nothing'. Choose one of: distance_cost, revisit,",
     "plan QUICK -s none.py": "none.py: cannot be read: No such file or directory. Name a readable file.",
     "plan QUICK -a cbbaa": "there is no algorithm 'cbbaa'. Did you mean 'cbba'?",
@@ -167,7 +171,7 @@ def test_an_older_file_is_kept_when_the_run_fails(swarmbid, tmp_path: Path):
     (tmp_path / "plan.json").write_text("precious")
     assert swarmbid("plan", QUICKSTART, "-s", "nothing", "-o", "plan.json").status == 2
     assert (tmp_path / "plan.json").read_text() == "precious"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["plan.json"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["plan.json", QUICKSTART]
 
 
 def test_a_task_that_is_not_there_is_said_to_be_misspelt(swarmbid):

@@ -21,7 +21,7 @@ def bench(
     from swarmbid import registry
     from swarmbid.cli.output import check_writable, complain, progress, say, say_json, say_table, write_text
 
-    check_writable(write)
+    check_writable(write, given=Path(name))
     experiment = registry.load("experiments", name)
     with progress(name) as bar:
         result = experiment.run(quick=quick, progress=bar)

@@ -108,8 +108,12 @@ def write_text(path: Path, text: str) -> None:
         ) from None
 
 
-def check_writable(*paths: Path | None) -> None:
-    """Refuse output paths that cannot be written before any work is done.
+def check_writable(*paths: Path | None, given: Path) -> None:
+    """Refuse output paths that cannot be written, or would overwrite the input, before any work is done.
+
+    Parameters
+    ----------
+    given : the input.
 
     Raises
     ------
@@ -120,7 +124,9 @@ def check_writable(*paths: Path | None) -> None:
     for path in paths:
         if path is None:
             continue
-        if path.resolve() in seen:
+        if path.resolve() == given.resolve():
+            faults.append(Fault(str(path), "", "is the input", "Give the output a file of its own."))
+        elif path.resolve() in seen:
             faults.append(Fault(str(path), "", "is named for two outputs", "Give each a file of its own."))
         seen.add(path.resolve())
         if path.is_dir():

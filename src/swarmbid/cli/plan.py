@@ -46,11 +46,11 @@ def plan(
     from swarmbid.cli.running import carry_out
     from swarmbid.missionfile import load_mission
 
-    check_writable(output, report)
+    check_writable(output, report, given=mission)
     first = output or report
     if trace is None and first is not None:
         trace = first.with_suffix(".trace.jsonl")
-    check_writable(output, report, trace)
+    check_writable(output, report, trace, given=mission)
     status = carry_out(
         load_mission(mission),
         algorithm=algorithm,

@@ -55,7 +55,7 @@ def simulate(
     from swarmbid.cli.running import carry_out
     from swarmbid.network import Network, agent_positions, make_topology
 
-    check_writable(output, report, trace)
+    check_writable(output, report, trace, given=Path(what))
     mission = _mission(what, seed, agents, tasks, option or [])
     num_agents = max(len(mission.agents), 1)
     network = Network(

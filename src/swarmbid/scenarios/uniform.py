@@ -41,7 +41,7 @@ class Options:
     grid: int = _option(0, "put everything on a grid of so many positions a side, for ties; 0 for anywhere")
     speed: float = _option(10.0, "speed of every agent, m/s")
     fuel_per_metre: float = _option(0.0, "score lost per m flown")
-    bundle_limit: int = _option(0, "most tasks an agent takes at once; 0 for no limit")
+    bundle_limit: int = _option(10, "most tasks an agent takes at once; 0 for no limit")
     reward_min: float = _option(10.0, "lowest reward, score")
     reward_max: float = _option(100.0, "highest reward, score; equal to reward_min for ties")
     discount: float = _option(0.01, "how fast rewards fade, 1/s")
