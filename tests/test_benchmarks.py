@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -77,3 +78,13 @@ def test_a_table_prints_and_writes_what_was_promised():
         "## Speed\n\n| what | s |\n| --- | ---: |\n| run | 0.5 |\n| longer run | 10.0 |\n\n"
         "Two words a line.\n\n- **kept**: fast\n- **MISSED**: small\n"
     )
+
+
+def test_the_c_library_leaves_the_arithmetic_of_the_process_alone(tmp_path: Path):
+    """Linked with -ffast-math it would make subnormal numbers zero, here and in every test that follows."""
+    compiler = shutil.which("gcc")
+    if compiler is None:
+        pytest.skip("no gcc on this machine")
+    insertion.build(compiler, tmp_path / "insertion.so")
+    insertion.load(tmp_path / "insertion.so")
+    assert np.float64(5e-324) * 1.0 == 5e-324

@@ -66,7 +66,7 @@ def measure(trace: Trace) -> Metrics:
     """Take all the numbers of a finished run; InputError if it was stopped before its end."""
     result = trace.finished()
     mission = trace.mission()
-    plan = Plan.from_dict(result.plan)
+    plan = Plan.from_dict(result.plan, where=trace.source)
     sent = list(trace.of(Sent))
     total_bytes = sum(record.bytes for record in sent)
     speed = {agent.id: agent.speed for agent in mission.agents}

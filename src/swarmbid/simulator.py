@@ -93,6 +93,7 @@ def simulate(
     mode: str = "rounds",
     max_rounds: int | None = None,
     through_bytes: bool = False,
+    progress: Callable[[float], None] | None = None,
     **options: Any,
 ) -> Run:
     """Let the agents of `mission` negotiate until all know that they agree.
@@ -108,6 +109,7 @@ def simulate(
     mode : "rounds" or "asynchronous".
     max_rounds : when to give up; far beyond what theory allows by default.
     through_bytes : send every message through its bytes, as on a real network.
+    progress : called with the time, s, after every instant, so that somebody who waits can be told.
     options : of the algorithm.
 
     Raises
@@ -148,6 +150,7 @@ def simulate(
     except TypeError as error:
         raise InputError([Fault(f"algorithm {algorithm}", "options", str(error), "Leave it out.")]) from None
     running = _Run(mission, arrays, negotiators, network, mode, seed, through_bytes)
+    running.progress = progress
     if trace is None:
         return running.go(algorithm, found, rule, max_rounds)
     with TraceWriter(trace) as writer:
@@ -200,6 +203,7 @@ class _Run:
         self.mode = mode
         self.through_bytes = through_bytes
         self.writer: TraceWriter | None = None
+        self.progress: Callable[[float], None] | None = None
         self.now = 0.0
         self._heap: list[tuple[float, int, Message | None, tuple[int, ...]]] = []
         self._count = 0
@@ -228,6 +232,8 @@ class _Run:
         false_agreements = 0
         while self._heap and self._heap[0][0] < limit:
             ticked = self._instant()
+            if self.progress is not None:
+                self.progress(self.now)
             if not ticked or not all(one.agreed for one in self.negotiators):
                 if ticked and self._hopeless():
                     reason = self._split()

@@ -11,6 +11,7 @@ default. A reader keeps kinds that it does not know (`Other`) and skips fields t
 from __future__ import annotations
 
 import io
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from os import PathLike
@@ -181,16 +182,8 @@ class Trace:
         """Return `result`; when you cannot do without, for it raises InputError if there is none."""
         result = self.result
         if result is None:
-            raise InputError(
-                [
-                    Fault(
-                        self.source,
-                        "",
-                        "has no result record: the run was stopped before its end",
-                        "Run it again to its end.",
-                    )
-                ]
-            )
+            why = "has no result record: the run was stopped before its end"
+            raise _fault(self.source, why, "Run it again to its end.")
         return result
 
     def of(self, kind: type[Kind]) -> Iterator[Kind]:
@@ -210,8 +203,9 @@ class TraceWriter:
     """Writes a trace; use it as a context manager, hand it the `Header` first.
 
     To a path, the lines go to a file beside it whose name ends in ``.part``, which takes the name of
-    `target` when the run is over: an older trace is never half overwritten, and a run that is killed
-    leaves what it had written, readable with ``read_trace(path, partial=True)``.
+    `target` when the run is over: an older trace is never half overwritten. A run that ends with an
+    exception leaves all that it had written there; one that is killed, the header and what it had
+    handed on since, a mebibyte at a time. Read it with ``read_trace(path, partial=True)``.
 
     Parameters
     ----------
@@ -237,28 +231,21 @@ class TraceWriter:
         self._file: Any
         if isinstance(target, str | PathLike):
             path = Path(target)
-            # Pipes and devices have nothing to be renamed onto.
-            if path.exists() and not path.is_file():
-                self._partial = path
-            else:
-                self._final = path.resolve()
-                self._partial = self._final.with_name(self._final.name + PARTIAL_SUFFIX)
             try:
+                # Pipes and devices have nothing to be renamed onto.
+                if path.exists() and not path.is_file():
+                    self._partial = path
+                else:
+                    self._final = path.resolve()
+                    self._partial = self._final.with_name(self._final.name + PARTIAL_SUFFIX)
                 self._file = self._partial.open("wb", buffering=0)
             except OSError as error:
-                raise InputError(
-                    [
-                        Fault(
-                            str(target),
-                            "",
-                            f"cannot be written: {error.strerror or error}",
-                            "Give a path in a directory that exists and that you may write to.",
-                        )
-                    ]
-                ) from error
+                mend = "Give a path in a directory that exists and that you may write to."
+                raise _fault(str(target), f"cannot be written: {error.strerror or error}", mend) from error
         else:
             self._file = target
-        self._text = isinstance(self._file, io.TextIOBase)
+        # Wrappers such as tempfile's are text files without being a TextIOBase.
+        self._text = isinstance(self._file, io.TextIOBase) or hasattr(self._file, "encoding")
 
     def write(self, record: Header | Known) -> None:
         """Append one record."""
@@ -300,11 +287,14 @@ class TraceWriter:
         self._end(keep_name=error is None)
 
     def _append(self, line: bytes) -> None:
+        if self._file is None:
+            raise ValueError("this trace is closed; open another TraceWriter")
         self._lines.append(line)
         self._lines.append(b"\n")
         self._size += len(line) + 1
         self._count += 1
-        if self._size >= _BUFFER_BYTES:
+        # The header goes out at once, so that what a killed run leaves can be read.
+        if self._size >= _BUFFER_BYTES or self._count == 1:
             self.flush()
 
     def _end(self, *, keep_name: bool) -> None:
@@ -352,9 +342,9 @@ def read_trace(path: str | PathLike[str], *, partial: bool = False) -> Trace:
                     continue
                 try:
                     record: Record = known.decode(line)
-                except msgspec.MsgspecError as error:
+                except _UNREADABLE as error:
                     cut = not line.endswith(b"\n")
-                    if cut and partial:
+                    if cut and partial and not _is_json(line):
                         break
                     record = _read_other(line, now, where, str(error), cut)
                 now = record.t
@@ -388,7 +378,7 @@ def _read_header(line: bytes, where: str) -> Header:
     mend = "Give a trace, as `swarmbid simulate --trace` writes it."
     try:
         first = msgspec.json.decode(line)
-    except msgspec.MsgspecError as error:
+    except _UNREADABLE as error:
         raise _fault(where, f"{no_trace}: its first line is no JSON object ({error})", mend) from error
     if not isinstance(first, dict) or first.get("kind") != "trace":
         raise _fault(where, f'{no_trace}: its first line is not of kind "trace"', mend)
@@ -409,7 +399,7 @@ def _read_other(line: bytes, now: float, where: str, problem: str, cut: bool) ->
     """Keep a record of an unknown kind; raise for a broken line."""
     try:
         fields = msgspec.json.decode(line)
-    except msgspec.MsgspecError:
+    except _UNREADABLE:
         if cut:
             raise _fault(
                 where,
@@ -420,10 +410,21 @@ def _read_other(line: bytes, now: float, where: str, problem: str, cut: bool) ->
     kind = fields.get("kind") if isinstance(fields, dict) else None
     if not isinstance(kind, str) or kind in _KNOWN_KINDS:
         raise _fault(where, f"is broken: {problem}", "Run it again.")
-    t = fields.get("t", now)
-    return Other(kind, float(t) if isinstance(t, int | float) else now, fields)
+    t = fields.get("t")
+    timed = isinstance(t, int | float) and abs(t) <= sys.float_info.max
+    return Other(kind, float(t) if timed else now, fields)
 
 
+def _is_json(line: bytes) -> bool:
+    try:
+        msgspec.json.decode(line)
+    except _UNREADABLE:
+        return False
+    return True
+
+
+# No UTF-8, or nested beyond reason: msgspec lets these two through as they are.
+_UNREADABLE = (msgspec.MsgspecError, UnicodeDecodeError, RecursionError)
 _KNOWN_KINDS = frozenset(str(kind.__struct_config__.tag) for kind in RECORD_KINDS)
 
 

@@ -109,7 +109,14 @@ def offers(
     judge = _Judge(mission, paths, score, algorithm, insertion)
     judge.steps = MOST_STEPS * 10  # one task only, so every agent can be asked
     holders = {agent for agent, path in judge.paths.items() if any(step.id == task.id for step, _ in path)}
-    return [judge.offer(agent, task) for agent in judge.agents if agent.id not in holders]
+    found = []
+    for agent in judge.agents:
+        if agent.id not in holders:
+            try:
+                found.append(judge.offer(agent, task))
+            except _OutOfSteps:
+                found.append(Offer(agent.id, None, None, "other", "not examined: there are too many places"))
+    return found
 
 
 class _OutOfSteps(Exception):

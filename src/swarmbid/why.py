@@ -6,6 +6,7 @@ mission and the final plan in plain Python, so that the answer does not depend o
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -54,8 +55,9 @@ class Explanation:
 
     Parameters
     ----------
-    task : what it is. winner : the agent's id; None if nobody does it. bid : the winning bid.
-    start : s, planned. outcome : a sentence. history : in order of time. others : in order of id.
+    task : its id. needs : what it asks for, in words. winner : the agent's id; None if nobody does it.
+    bid : the winning bid, score units. start : s, planned. outcome : a sentence.
+    history : in order of time. others : in order of id. in_rounds : whether the run counted rounds.
     """
 
     task: str
@@ -91,16 +93,18 @@ class Explanation:
         return "\n".join(lines)
 
 
-def explain(trace: Trace, task_id: str) -> Explanation:
+def explain(trace: Trace, task_id: str, *, score: str | Score | None = None) -> Explanation:
     """Explain what became of one task.
 
     Parameters
     ----------
     trace : of a run that ended (`swarmbid.trace.read_trace`).
+    score : what the agents bid by, if it is a user's own: a trace may come from anybody, so code that it
+        names is not run. By default what the trace says.
 
     Raises
     ------
-    InputError : there is no such task, or the run did not end.
+    InputError : there is no such task, the run did not end, or it needs `score`.
     """
     mission = trace.mission()
     tasks = {task.id: task for task in mission.tasks}
@@ -121,7 +125,7 @@ def explain(trace: Trace, task_id: str) -> Explanation:
         start=start,
         outcome=_outcome(plan, task_id, winner, bid, start),
         history=history,
-        others=_others(mission, plan, trace, task, bids, bid),
+        others=_others(mission, plan, trace, task, bids, bid, _score(trace, score)),
         in_rounds=trace.header.mode == "rounds",
     )
 
@@ -146,11 +150,7 @@ def _history(trace: Trace, task_id: str) -> tuple[Step, ...]:
                 Step(record.t, record.agent, f"bids {record.bid:.6g} (as stop {record.position + 1})")
             )
         elif isinstance(record, Outbid) and record.task == task_id:
-            by = (
-                f"by {record.by} with {record.by_bid:.6g}"
-                if record.by
-                else "by somebody who gave it up since"
-            )
+            by = f"by {record.by} with {record.by_bid:.6g}"
             steps.append(Step(record.t, record.agent, f"is outbid {by} (had bid {record.bid:.6g})"))
         elif isinstance(record, Released) and record.task == task_id:
             because = f", having lost {record.because}" if record.because else " for a better bundle"
@@ -190,19 +190,26 @@ def _outcome(plan: Plan, task_id: str, winner: str | None, bid: float | None, st
 
 
 def _others(
-    mission: Mission, plan: Plan, trace: Trace, task: Task, bids: dict[str, float], won: float | None
+    mission: Mission,
+    plan: Plan,
+    trace: Trace,
+    task: Task,
+    bids: dict[str, float],
+    won: float | None,
+    score: Score,
 ) -> tuple[Other, ...]:
     tasks = {one.id: one for one in mission.tasks}
     paths = {one.agent: [(tasks[visit.task], visit.start) for visit in one.visits] for one in plan.agents}
     header = trace.header
-    insertion = str(header.options.get("insertion", "shift"))
+    insertion = str(header.options.get("insertion", score.insertion))
+    ceilings = _ceilings(trace, plan)
     found = []
-    for offer in offers(mission, paths, _score(trace), task, algorithm=header.algorithm, insertion=insertion):
+    for offer in offers(mission, paths, score, task, algorithm=header.algorithm, insertion=insertion):
         why = offer.detail
         if offer.gain is not None and offer.gain <= 0.0:
             why += ": not worth a bid"
         elif offer.gain is not None and won is not None:
-            why += f", {'less' if offer.gain < won else 'no less'} than the bid of {won:.6g}"
+            why += _beside(offer.gain, won, ceilings.get(offer.agent, math.inf))
         best = bids.get(offer.agent)
         if best is not None:
             why += f"; it once bid {best:.6g}"
@@ -210,13 +217,40 @@ def _others(
     return tuple(found)
 
 
-def _score(trace: Trace) -> Score:
+def _beside(gain: float, won: float, ceiling: float) -> str:
+    """Compare what an agent could gain with the bid that won."""
+    if math.isclose(gain, won, rel_tol=1e-9):
+        return f", as much as the bid of {won:.6g}"
+    if gain < won:
+        return f", less than the bid of {won:.6g}"
+    more = f", more than the bid of {won:.6g}"
+    if ceiling <= won * (1.0 + 1e-9):
+        more += f", but with what it has taken it may bid {ceiling:.6g} at most (bids never rise)"
+    return more
+
+
+def _ceilings(trace: Trace, plan: Plan) -> dict[str, float]:
+    """The lowest bid in each agent's bundle, above which warped bids may not rise; empty without warp."""
+    if not trace.header.options.get("warp", True):
+        return {}
+    bids = {(record.agent, record.task): record.bid for record in trace.of(Taken)}
+    held = {
+        one.agent: [bids.get((one.agent, visit.task), math.inf) for visit in one.visits]
+        for one in plan.agents
+    }
+    return {agent: min(found, default=math.inf) for agent, found in held.items()}
+
+
+def _score(trace: Trace, given: str | Score | None) -> Score:
+    if given is not None:
+        return make_score(given)
     options = dict(trace.header.score)
-    name = options.pop("name")
-    if name == "custom":
-        source = options.get("source")
-        mend = "Run `swarmbid why` where the score's file is, on a trace made with --score FILE.py."
-        if not source:
-            raise InputError([Fault(trace.source, "score", "is a function that the trace cannot hold", mend)])
-        return make_score(source)
+    name = options.pop("name", None)
+    if not isinstance(name, str):
+        mend = "Run it again: its first line must name the score."
+        raise InputError([Fault(trace.source, "score", "has no name", mend)])
+    if name == "custom" or name.endswith(".py"):
+        source = options.get("source") or "FILE.py"
+        mend = f"Give that score, if you trust it: --score {source}."
+        raise InputError([Fault(trace.source, "score", "is somebody's own, which is not run unasked", mend)])
     return make_score(name, **options)

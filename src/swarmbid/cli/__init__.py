@@ -6,6 +6,7 @@ rule (said which); 2 bad input or usage.
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import sys
@@ -53,10 +54,22 @@ def main() -> None:
     if hasattr(signal, "SIGPIPE"):
         # When the reader (say, `head`) has had enough, end as other tools do.
         signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+    # An interrupt ends the program at once, also in the middle of compiled code; what was written of a
+    # trace stays, as after any kill.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # A name that the terminal cannot show is shown by its code points.
+            stream.reconfigure(errors="backslashreplace")
     try:
         status = app(standalone_mode=False)
+        sys.stdout.flush()
     except InputError as error:
         status = complain(str(error), 2)
+    except OSError as error:
+        status = complain(f"{error.filename or 'the output'}: {error.strerror or error}", 2)
+        # What standard output could not take must not be tried again on the way out.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     except Exception as error:
         status = _unforeseen(error)
     sys.exit(status if isinstance(status, int) else 0)

@@ -48,7 +48,7 @@ def plan(
 
     check_writable(output, report, given=mission)
     first = output or report
-    if trace is None and first is not None:
+    if trace is None and first is not None and not first.is_char_device():
         trace = first.with_suffix(".trace.jsonl")
     check_writable(output, report, trace, given=mission)
     status = carry_out(

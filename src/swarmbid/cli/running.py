@@ -3,11 +3,27 @@
 from __future__ import annotations
 
 import json
+from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
 
-from swarmbid.cli.output import complain, count_of, say, say_json, say_table, shortened, write_text
+from swarmbid.cli.output import (
+    complain,
+    count_of,
+    say,
+    say_json,
+    say_table,
+    shortened,
+    waiting,
+    write_text,
+)
+from swarmbid.errors import Fault, InputError
 from swarmbid.model import Mission
+
+if TYPE_CHECKING:
+    from swarmbid.simulator import Run
+    from swarmbid.trace import Trace
 
 PATH_WIDTH = 60
 MOST_UNSERVED = 20
@@ -29,19 +45,17 @@ def carry_out(
     max_rounds: int | None = None,
 ) -> int:
     """Run a negotiation, print what came of it, write what was asked for; return the exit status."""
-    import swarmbid.simulator as simulator
-    from swarmbid.metrics import measure
-    from swarmbid.trace import read_trace
     from swarmbid.verify import verify
 
-    run = simulator.simulate(
+    run, record = _run(
         mission,
+        trace,
+        recorded=report is not None or as_json,
         algorithm=algorithm,
         score=score,
         insertion=insertion,
         network=network,
         seed=seed,
-        trace=trace,
         mode=mode,
         max_rounds=max_rounds,
     )
@@ -52,7 +66,6 @@ def carry_out(
     if report is not None:
         from swarmbid.report import render_report
 
-        record = read_trace(trace) if trace is not None else None
         write_text(report, render_report(mission, plan, record, violations))
     problems = []
     if not run.converged:
@@ -75,11 +88,12 @@ def carry_out(
         "dropped": run.dropped,
     }
     if as_json:
-        metrics = measure(read_trace(trace)).to_dict() if trace is not None else None
+        from swarmbid.metrics import measure
+
         say_json(
             {
                 "run": figures,
-                "metrics": metrics,
+                "metrics": measure(record).to_dict() if record is not None else None,
                 "plan": plan.to_dict(),
                 "disagreements": run.disagreements,
                 "violations": [str(violation) for violation in violations],
@@ -92,6 +106,32 @@ def carry_out(
     for problem in problems:
         complain(problem, 1)
     return 1 if problems else 0
+
+
+def _run(
+    mission: Mission, trace: Path | None, *, recorded: bool, score: str | None, **options: Any
+) -> tuple[Run, Trace | None]:
+    """Simulate; also return the record if `recorded`, even where no file of it is to be kept."""
+    from swarmbid.simulator import simulate
+    from swarmbid.trace import read_trace
+
+    with ExitStack() as stack:
+        if trace is None and recorded:
+            trace = Path(stack.enter_context(TemporaryDirectory(prefix="swarmbid-")), "run.jsonl")
+        say_round = stack.enter_context(waiting(mission.name))
+        try:
+            run = simulate(mission, score=score, trace=trace, progress=say_round, **options)
+        except InputError:
+            raise
+        except Exception as error:
+            if score is None or not score.endswith(".py"):
+                raise
+            # Numba puts the cause last, and calls itself by name first.
+            said = [line.strip() for line in str(error).splitlines() if "nopython" not in line]
+            why = f"fails: {type(error).__name__}: {next(filter(None, said), '')}"
+            mend = "It may use arithmetic and `math`, and returns a number for every visit."
+            raise InputError([Fault(score, "score", why, mend)]) from None
+        return run, read_trace(trace) if trace is not None and recorded else None
 
 
 def _tell(mission: Mission, run: Any, plan: Any) -> None:

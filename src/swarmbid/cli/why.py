@@ -13,6 +13,9 @@ from swarmbid.cli.plan import AsJson
 def why(
     trace: Annotated[Path, typer.Argument(metavar="TRACE", help="Record of a run, JSON lines.")],
     task: Annotated[str, typer.Argument(metavar="TASK", help="Id of a task of its mission.")],
+    score: Annotated[
+        str | None, typer.Option("-s", "--score", help="The .py file of a score of your own, if it was used.")
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Tell who bid what for TASK, who won, who was outbid, and why the others do not do it."""
@@ -20,7 +23,7 @@ def why(
     from swarmbid.trace import read_trace
     from swarmbid.why import explain
 
-    explanation = explain(read_trace(trace), task)
+    explanation = explain(read_trace(trace), task, score=score)
     if as_json:
         say_json(explanation.to_dict())
     else:

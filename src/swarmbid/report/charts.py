@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from swarmbid.report.svg import CHARACTER_EM, clock, nice_step, number, tag
+from swarmbid.report.svg import CHARACTER_EM, clock, nice_step, number, tag, time_step
 from swarmbid.trace import Sent, Taken, Trace
 
 WIDTH, HEIGHT = 540.0, 190.0
-LEFT, RIGHT, TOP, BOTTOM = 44.0, 10.0, 20.0, 34.0
+LEFT, RIGHT, TOP, BOTTOM = 44.0, 10.0, 26.0, 34.0
 MOST_BARS = 60
+WIDEST_BAR = 56.0
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ def render_bars_svg(bars: Bars, *, css: str, told: str, marks: Sequence[tuple[fl
     Parameters
     ----------
     css : class of the bars. told : what is counted, for readers who cannot see it.
-    marks : times (or rounds) to mark with an upright line, each with its name.
+    marks : times to mark with an upright line, each with its name; in rounds, how many are over by then.
     """
     span = bars.width * len(bars.counts)
     pitch = (WIDTH - LEFT - RIGHT) / len(bars.counts)
@@ -63,19 +64,18 @@ def render_bars_svg(bars: Bars, *, css: str, told: str, marks: Sequence[tuple[fl
         )
     for place, value in enumerate(bars.counts):
         if value:
-            x = LEFT + place * pitch + pitch * 0.12
-            bar = tag(
-                "rect", x=x, y=floor - value * rise, width=pitch * 0.76, height=value * rise, class_=css
-            )
+            width = min(pitch * 0.76, WIDEST_BAR)
+            x = LEFT + (place + 0.5) * pitch - width / 2
+            bar = tag("rect", x=x, y=floor - value * rise, width=width, height=value * rise, class_=css)
             when = _when(bars, place)
             parts.append(tag("g", tag("title", f"{when}: {value:,}") + bar))
     parts.append(_ticks(bars, pitch, floor))
     scale = (WIDTH - LEFT - RIGHT) / span
     for place, (instant, name) in enumerate(marks):
-        x = LEFT + (instant + (0.5 * bars.width if bars.rounds else 0.0)) * scale
-        parts.append(tag("line", x1=x, y1=TOP - 4, x2=x, y2=floor, class_="mark"))
+        x = LEFT + min(instant, span) * scale
+        parts.append(tag("line", x1=x, y1=TOP - 18, x2=x, y2=floor, class_="mark"))
         left = x + len(name) * 11 * CHARACTER_EM > WIDTH - RIGHT
-        y = TOP + 6 + 14 * place
+        y = TOP - 10 + 14 * place
         anchor = "end" if left else None
         parts.append(
             tag("text", name, x=x - 5 if left else x + 5, y=y, text_anchor=anchor, class_="mark-name")
@@ -94,12 +94,12 @@ def _ticks(bars: Bars, pitch: float, floor: float) -> str:
             label = f"{place * bars.width + 1:.0f}"
             parts.append(tag("text", label, x=x, y=floor + 15, text_anchor="middle", class_="soft"))
     else:
-        every = max(1, len(bars.counts) // 6)
-        for place in range(0, len(bars.counts) + 1, every):
-            x = LEFT + place * pitch
-            anchor = "middle" if place < len(bars.counts) else "end"
-            label = clock(place * bars.width)
-            parts.append(tag("text", label, x=x, y=floor + 15, text_anchor=anchor, class_="soft"))
+        step = time_step(bars.width * len(bars.counts), 8)
+        for place in range(int(bars.width * len(bars.counts) / step + 1e-9) + 1):
+            x = LEFT + place * step / bars.width * pitch
+            parts.append(
+                tag("text", clock(place * step), x=x, y=floor + 15, text_anchor="middle", class_="soft")
+            )
     name = "round" if bars.rounds else "time"
     middle = LEFT + (WIDTH - LEFT - RIGHT) / 2
     parts.append(tag("text", name, x=middle, y=floor + 29, text_anchor="middle", class_="soft"))

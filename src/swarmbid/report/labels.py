@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 _CELL = 40.0
@@ -19,11 +20,19 @@ class LabelPlacer:
         self.width, self.height = width, height
         # Taken boxes by cell, so that a crowded map costs no quadratic time.
         self._cells: dict[tuple[int, int], list[tuple[float, float, float, float]]] = {}
+        self._lines: dict[tuple[int, int], list[tuple[float, float]]] = {}
 
     def block(self, left: float, top: float, right: float, bottom: float) -> None:
         """Keep labels out of a box."""
         for cell in self._covered(left, top, right, bottom):
             self._cells.setdefault(cell, []).append((left, top, right, bottom))
+
+    def avoid(self, x1: float, y1: float, x2: float, y2: float) -> None:
+        """Keep labels off a straight line where they have a choice."""
+        pieces = max(1, math.ceil(math.hypot(x2 - x1, y2 - y1) / 5.0))
+        for piece in range(pieces + 1):
+            x, y = x1 + (x2 - x1) * piece / pieces, y1 + (y2 - y1) * piece / pieces
+            self._lines.setdefault((int(x // _CELL), int(y // _CELL)), []).append((x, y))
 
     def place(self, x: float, y: float, room: float, width: float, size: float) -> tuple[float, float] | None:
         """Find a place for a label beside a point, and take it.
@@ -40,7 +49,7 @@ class LabelPlacer:
         """
         gap = room + 4.0
         rise = size * 0.36
-        for left, base in (
+        spots = (
             (x + gap, y + rise),
             (x - gap - width, y + rise),
             (x - width / 2, y - gap - 1.0),
@@ -49,12 +58,22 @@ class LabelPlacer:
             (x + gap * 0.75, y + gap * 0.75 + size * 0.7),
             (x - gap * 0.75 - width, y - gap * 0.75),
             (x - gap * 0.75 - width, y + gap * 0.75 + size * 0.7),
-        ):
-            box = (left, base - size * 0.8, left + width, base + size * 0.25)
-            if self._free(*box):
-                self.block(*box)
-                return left, base
-        return None
+        )
+        boxes = [(left, base - size * 0.8, left + width, base + size * 0.25) for left, base in spots]
+        free = [place for place, box in enumerate(boxes) if self._free(*box)]
+        if not free:
+            return None
+        # The first of those that cover least of the lines.
+        best = min(free, key=lambda place: (self._covers(*boxes[place]), place))
+        self.block(*boxes[best])
+        return spots[best]
+
+    def _covers(self, left: float, top: float, right: float, bottom: float) -> int:
+        return sum(
+            left < x < right and top < y < bottom
+            for cell in self._covered(left, top, right, bottom)
+            for x, y in self._lines.get(cell, ())
+        )
 
     def _free(self, left: float, top: float, right: float, bottom: float) -> bool:
         if left < 2.0 or top < 2.0 or right > self.width - 2.0 or bottom > self.height - 2.0:

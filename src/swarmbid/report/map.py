@@ -113,7 +113,9 @@ class _Frame:
         norths = [place[1] for place in places] or [0.0]
         wide, high = max(easts) - min(easts), max(norths) - min(norths)
         # A single point, or a line of points, still gets a map around it.
-        least = max(wide, high, 1.0) * 0.02
+        if max(wide, high) < 1.0:
+            wide, high = 100.0, 40.0
+        least = max(wide, high) * 0.02
         wide, high = max(wide, least), max(high, least)
         inner = WIDTH - 2 * MARGIN
         height = min(max(inner * high / wide + 2 * MARGIN, LOWEST), HIGHEST)
@@ -133,21 +135,21 @@ class _Frame:
 
 def _grid(frame: _Frame) -> str:
     step = nice_step(WIDTH / frame.scale, 8)
-    parts = []
+    parts, labels = [], []
     east = -(-frame.west // step) * step
     while (x := (east - frame.west) * frame.scale) <= WIDTH:
         parts.append(tag("line", x1=x, y1=0, x2=x, y2=frame.height, class_="grid"))
         if MARGIN < x < WIDTH - 130:
             label = _coordinate(east, step)
-            parts.append(tag("text", label, x=x, y=frame.height - 8, class_="soft", text_anchor="middle"))
+            labels.append(tag("text", label, x=x, y=frame.height - 8, class_="soft", text_anchor="middle"))
         east += step
     north = (frame.north // step) * step
     while (y := (frame.north - north) * frame.scale) <= frame.height:
         parts.append(tag("line", x1=0, y1=y, x2=WIDTH, y2=y, class_="grid"))
         if 20 < y < frame.height - 24:
-            parts.append(tag("text", _coordinate(north, step), x=8, y=y + 4, class_="soft"))
+            labels.append(tag("text", _coordinate(north, step), x=8, y=y + 4, class_="soft"))
         north -= step
-    return "".join(parts)
+    return "".join(parts + labels)
 
 
 def _coordinate(value: float, step: float) -> str:
@@ -203,9 +205,15 @@ def _places(frame: _Frame, scene: Scene) -> list[str]:
     )
     shapes = shape_of(scene)
     placer = LabelPlacer(WIDTH, frame.height)
-    # The corners that the furniture takes.
+    # The corners that the furniture takes, and the edges with the coordinates.
+    placer.block(0, 0, MARGIN, frame.height)
+    placer.block(0, frame.height - 20, WIDTH, frame.height)
     placer.block(WIDTH - 130, frame.height - 44, WIDTH, frame.height)
     placer.block(WIDTH - 44, 0, WIDTH, 64)
+    for row in scene.rows:
+        stops = [frame.at(scene.tasks[visit.task].position) for visit in row.plan.visits]
+        for (x1, y1), (x2, y2) in pairwise([frame.at(row.agent.position), *stops]):
+            placer.avoid(x1, y1, x2, y2)
     parts = []
     for task in scene.mission.tasks:
         x, y = frame.at(task.position)
@@ -328,28 +336,25 @@ def _furniture(frame: _Frame) -> str:
 
 def _legend(scene: Scene) -> tuple[list[str], float]:
     """Lay out the agents' names under a picture that stands alone."""
-    parts: list[str] = []
     busy = [row for row in scene.rows if row.plan.visits]
-    x, y = 16.0, 20.0
-    for row in busy[:MOST_LEGEND]:
-        stops = count(len(row.plan.visits), "task")
-        text = f"{shorten(row.agent.id, 18)}: {stops}, {metres(row.plan.distance)}"
-        width = 34.0 + len(text) * 11 * CHARACTER_EM + 16.0
-        if x + width > WIDTH and x > 16.0:
-            x, y = 16.0, y + LEGEND_ROW
-        line = tag(
-            "line", x1=x, y1=y - 4, x2=x + 26, y2=y - 4, class_="leg", stroke_dasharray=dash(row.index)
-        )
-        label = tag("text", escape(text), x=x + 33, y=y)
-        parts.append(tag("g", line + label, class_=colour_class(row.index)))
-        x += width
-    notes = [f"and {count(len(busy) - MOST_LEGEND, 'more agent', 'more agents')}"] * (len(busy) > MOST_LEGEND)
+    texts = [
+        f"{shorten(row.agent.id, 18)}: {count(len(row.plan.visits), 'task')}, {metres(row.plan.distance)}"
+        for row in busy[:MOST_LEGEND]
+    ]
+    notes = [f"and {count(len(busy) - MOST_LEGEND, 'more agent')}"] * (len(busy) > MOST_LEGEND)
     if scene.unserved:
         notes.append(f"crossed out: {count(len(scene.unserved), 'task')} not served")
-    for note in notes:
-        width = len(note) * 11 * CHARACTER_EM + 16.0
-        if x + width > WIDTH and x > 16.0:
-            x, y = 16.0, y + LEGEND_ROW
-        parts.append(tag("text", escape(note), x=x, y=y, class_="soft"))
-        x += width
-    return parts, y + 12.0
+    widest = max((len(text) for text in [*texts, *notes]), default=0) * 11 * CHARACTER_EM + 50.0
+    columns = max(1, int((WIDTH - 16.0) // widest))
+    parts = []
+    for place, text in enumerate([*texts, *notes]):
+        x = 16.0 + place % columns * widest
+        y = 20.0 + place // columns * LEGEND_ROW
+        if place >= len(texts):
+            parts.append(tag("text", escape(text), x=x, y=y, class_="soft"))
+            continue
+        index = busy[place].index
+        line = tag("line", x1=x, y1=y - 4, x2=x + 26, y2=y - 4, class_="leg", stroke_dasharray=dash(index))
+        label = tag("text", escape(text), x=x + 33, y=y)
+        parts.append(tag("g", line + label, class_=colour_class(index)))
+    return parts, 20.0 + (len(parts) - 1) // columns * LEGEND_ROW + 12.0 if parts else 0.0

@@ -67,46 +67,57 @@ def render_report(
 
 
 def _header(scene: Scene, metrics: Metrics | None, violations: Sequence[Violation] | None) -> str:
-    busy = sum(1 for row in scene.rows if row.plan.visits)
-    served, left = len(scene.served), len(scene.unserved)
+    left = len(scene.unserved)
+    converged = metrics is None or metrics.status == "converged"
     badges = []
     if metrics is not None:
-        converged = metrics.status == "converged"
         badges.append(_badge("Agreed" if converged else "Not agreed", "" if converged else "bad"))
     if violations is not None:
-        text = (
-            f"Checked: {count(len(violations), 'violation')}" if violations else "Checked: can be flown as is"
-        )
-        badges.append(_badge(text, "bad" if violations else ""))
+        text = "can be flown as is" if converged else "breaks no rule"
+        if violations:
+            text = count(len(violations), "violation")
+        badges.append(_badge(f"Checked: {text}", "bad" if violations else ""))
     badges.append(
         _badge(f"{count(left, 'task')} not served" if left else "Every task served", "warn" if left else "")
     )
-    lead = f"{_of(busy, len(scene.rows), 'agent')} {'does' if busy == 1 else 'do'} "
-    lead += f"{_of(served, served + left, 'task')}. "
-    lead = lead[0].upper() + lead[1:]
-    if served:
-        lead += f"The last task ends after {span_of(scene.makespan)}"
-        lead += (
-            f"; everybody is back after {span_of(scene.horizon)}. "
-            if any(row.agent.base is not None and row.plan.visits for row in scene.rows)
-            else ". "
-        )
-    if metrics is not None and metrics.status == "converged" and metrics.rounds is not None:
-        lead += f"They agreed on it among themselves, without a leader, in {count(metrics.rounds, 'round')}."
     method = f"Plan by {escape(scene.plan.algorithm)} · score {escape(scene.plan.score_name)}"
     return (
         f'<header>\n<p class="over">{method}</p>\n<h1>{escape(scene.mission.name)}</h1>\n'
-        f'<p class="lead">{lead.strip()}</p>\n<ul class="badges">{"".join(badges)}</ul>\n</header>'
+        f'<p class="lead">{_lead(scene, metrics)}</p>\n<ul class="badges">{"".join(badges)}</ul>\n</header>'
     )
 
 
+def _lead(scene: Scene, metrics: Metrics | None) -> str:
+    """Say in two or three sentences what came of it."""
+    busy = [row for row in scene.rows if row.plan.visits]
+    served, total = len(scene.served), len(scene.mission.tasks)
+    if not total:
+        return "There is nothing to do."
+    if not busy:
+        return f"Nobody does anything; {count(total, 'task')} left."
+    agents = _of(len(busy), len(scene.rows), "agent")
+    does = "does" if len(busy) == 1 else "do"
+    parts = [f"{agents[0].upper()}{agents[1:]} {does} {_of(served, total, 'task')}."]
+    ends = f"The last task ends after {span_of(scene.makespan)}"
+    back = [row.plan.finish for row in busy if row.agent.base is not None]
+    parts.append(f"{ends}; the last way home after {span_of(max(back))}." if back else f"{ends}.")
+    if metrics is not None and metrics.status != "converged":
+        parts.append(
+            "They had not agreed when they were stopped; what several meant to do is shown with the "
+            "highest bidder."
+        )
+    elif metrics is not None and metrics.rounds is not None and len(scene.rows) > 1:
+        parts.append(
+            f"They agreed on it among themselves, without a leader, in {count(metrics.rounds, 'round')}."
+        )
+    return " ".join(parts)
+
+
 def _of(part: int, whole: int, what: str) -> str:
-    """Write ``all 8 agents``, ``3 of 8 agents``, ``none of 8 agents``."""
-    if part == whole and part > 1:
-        return f"all {count(part, what)}"
-    if part == whole:
-        return f"the only {what}" if part else f"no {what}"
-    return f"{f'{part:,}' if part else 'none'} of {count(whole, what)}"
+    """Write ``all 8 agents``, ``both agents``, ``the only agent``, ``3 of 8 agents``."""
+    if part < whole:
+        return f"{part:,} of {count(whole, what)}"
+    return f"the only {what}" if part == 1 else f"both {what}s" if part == 2 else f"all {count(part, what)}"
 
 
 def _badge(text: str, css: str) -> str:
@@ -125,7 +136,7 @@ def _figures(scene: Scene, metrics: Metrics | None) -> str:
     if scene.plan.honest_score != scene.plan.total_score:
         figures.append(("Score along the paths", f"{scene.plan.honest_score:,.1f}"))
     if metrics is not None:
-        if metrics.rounds is not None:
+        if metrics.status == "converged" and metrics.rounds is not None:
             figures.append(("Rounds to agreement", f"{metrics.rounds:,}"))
         figures.append(("Broadcasts", f"{metrics.messages:,} <small>{octets(metrics.bytes)}</small>"))
         figures.append(("Inequality of work", f"{metrics.gini:.2f} <small>Gini</small>"))
@@ -150,6 +161,8 @@ def _map(scene: Scene) -> str:
 
 
 def _agents(scene: Scene) -> str:
+    if not scene.rows:
+        return ""
     items = []
     for row in scene.rows[:MOST_LISTED]:
         line = tag("line", x1=1, y1=6, x2=25, y2=6, class_="leg", stroke_dasharray=dash(row.index))
@@ -197,7 +210,7 @@ def _legend(scene: Scene) -> str:
         f"<li>{tag('svg', drawing, viewBox='0 0 26 16', aria_hidden='true')}{name}</li>"
         for drawing, name in entries
     )
-    return f'<h3>Signs</h3><ul class="legend">{items}</ul>'
+    return f'<h3>Signs</h3><ul class="legend">{items}</ul>' if items else ""
 
 
 def _timeline(scene: Scene) -> str:
@@ -238,11 +251,12 @@ def _unserved(scene: Scene) -> str:
 
 
 def _agreement(trace: Trace, metrics: Metrics) -> str:
+    if not metrics.num_agents:
+        return ""
     in_rounds = trace.header.mode == "rounds"
     marks = []
-    if in_rounds and metrics.rounds is not None:
-        # `rounds` counts them, and the first is number 0.
-        marks.append((float(max(metrics.rounds - 1, 0)), "all agree"))
+    if metrics.status == "converged" and metrics.rounds is not None:
+        marks.append((float(metrics.rounds), "all agree"))
     per = "each round" if in_rounds else "over time"
     bids = render_bars_svg(bids_over_time(trace), css="bar", told=f"Bids won in {per}", marks=marks)
     sent = render_bars_svg(messages_over_time(trace), css="bar two", told=f"Broadcasts in {per}")

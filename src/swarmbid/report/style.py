@@ -137,7 +137,7 @@ footer{{color:var(--soft);font-size:12.5px;margin-top:22px}}
  main{{padding:20px 12px 32px}} section{{padding:14px 12px}} h1{{font-size:24px}} .lead{{font-size:15px}}
  .figures{{grid-template-columns:1fr 1fr}} .figures div{{padding:10px 12px}} .figures dd{{font-size:18px}}
  .chart-map .name:not(.place){{display:none}}
- .chart-map text{{font-size:20px}}
+ .chart-map text{{font-size:20px}} .chart-map .place{{font-size:15px}}
  .chart-map .leg{{stroke-width:3.4}}
  .chart-time{{min-width:760px}}
  td,th{{padding:5px 6px}}
