@@ -27,7 +27,7 @@ def test_defaults_are_twenty_agents_and_a_hundred_tasks_in_a_square() -> None:
         assert up == 0.0
     assert all(10.0 <= task.reward < 100.0 for task in mission.tasks)
     assert all(task.start == 0.0 and math.isinf(task.end) for task in mission.tasks)
-    assert all(agent.bundle_limit is None for agent in mission.agents)
+    assert all(agent.bundle_limit == 10 for agent in mission.agents)
     assert mission.compatible == {}
 
 
