@@ -29,6 +29,7 @@ class Agreement:
         self._told: StampArray = np.full(num_agents, NOT_LISTED, np.int64)
         self._waited_for: NDArray[np.bool_] = np.ones(num_agents, np.bool_)
         self._waited_for[me] = False
+        self._doubtful = me  # somebody who lately held another digest: looked at first
 
     def hear(self, sender: int, message: Beliefs) -> None:
         """Take in what a message says of digests. The message is in the agent's own rows."""
@@ -43,11 +44,17 @@ class Agreement:
 
     def reached(self, digest: int) -> bool:
         """Whether the newest known digest of every live agent is `digest`."""
-        return not np.any((self._digest != np.uint64(digest)) & self._waited_for)
+        doubtful = self._doubtful
+        if self._waited_for[doubtful] and self._digest[doubtful] != digest:
+            return False
+        others = (self._digest != np.uint64(digest)) & self._waited_for
+        self._doubtful = int(np.argmax(others))
+        return not others[self._doubtful]
 
     def has_news(self, digest: int) -> bool:
         """Whether an agent is known to hold `digest` of which that has not been told."""
-        return bool(np.any((self._digest == np.uint64(digest)) & (self._at > self._told)))
+        holders = self._digest == np.uint64(digest)
+        return bool(holders.any() and (holders & (self._at > self._told)).any())
 
     def tell(self, digest: int, *, everything: bool) -> tuple[IntArray, StampArray]:
         """Return which agents hold `digest`, and since when; only the untold ones unless `everything`."""

@@ -161,9 +161,10 @@ def resolve(
                 changes += 1
             else:
                 flags[j] |= TO_SEND
+    own = heard[me]
     for m in range(heard.shape[0]):
-        if m != me and their_heard[m] > heard[m]:
-            heard[m] = their_heard[m]
+        heard[m] = max(heard[m], their_heard[m])
+    heard[me] = own
     return changes
 
 
