@@ -373,8 +373,8 @@ class _Run:
         return self.network.final_components(self.now) > 1
 
     def _split(self) -> str:
-        pieces = self.network.components(self.now)
-        return f"the network is in {len(pieces)} pieces that cannot hear each other"
+        pieces = self.network.final_components(self.now)
+        return f"the network is in {pieces} pieces that cannot hear each other"
 
     def _disagreements(self) -> list[dict[str, Any]]:
         if len(set(self._digests)) == 1:

@@ -13,6 +13,7 @@ from __future__ import annotations
 import io
 import sys
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -313,12 +314,12 @@ class TraceWriter:
         self._file = None
 
 
-def read_trace(path: str | PathLike[str], *, partial: bool = False) -> Trace:
+def read_trace(path: str | PathLike[str] | IO[bytes], *, partial: bool = False) -> Trace:
     """Read a trace.
 
     Parameters
     ----------
-    path : the file.
+    path : the file; or one that is open, in binary, at its beginning, which stays open.
     partial : accept a file whose last line is cut, as a killed run leaves it; the cut line is left out.
 
     Raises
@@ -326,13 +327,13 @@ def read_trace(path: str | PathLike[str], *, partial: bool = False) -> Trace:
     InputError
         With file and line, if it cannot be read, is empty, no trace, of another version, or broken.
     """
-    source = str(path)
+    source = str(path) if isinstance(path, str | PathLike) else str(getattr(path, "name", "trace"))
     known = msgspec.json.Decoder(Known)
     records: list[Record] = []
     header: Header | None = None
     now = 0.0
     try:
-        with Path(path).open("rb") as file:
+        with Path(path).open("rb") if isinstance(path, str | PathLike) else nullcontext(path) as file:
             for number, line in enumerate(file, start=1):
                 where = f"{source}:{number}"
                 if header is None:

@@ -68,8 +68,9 @@ def main() -> None:
         status = complain(str(error), 2)
     except OSError as error:
         status = complain(f"{error.filename or 'the output'}: {error.strerror or error}", 2)
-        # What standard output could not take must not be tried again on the way out.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        if error.filename is None:
+            # What standard output could not take must not be tried again on the way out.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     except Exception as error:
         status = _unforeseen(error)
     sys.exit(status if isinstance(status, int) else 0)

@@ -19,12 +19,13 @@ def bench(
 ) -> None:
     """Run a benchmark and print it beside the published results."""
     from swarmbid import registry
-    from swarmbid.cli.output import check_writable, complain, progress, say, say_json, say_table, write_text
+    from swarmbid.cli.output import check_writable, complain, say, say_json, say_table, write_text
+    from swarmbid.cli.waiting import cases_shown
 
     check_writable(write, given=Path(name))
     experiment = registry.load("experiments", name)
-    with progress(name) as bar:
-        result = experiment.run(quick=quick, progress=bar)
+    with cases_shown(name) as show:
+        result = experiment.run(quick=quick, progress=show)
     if as_json:
         say_json(result.to_dict())
     else:

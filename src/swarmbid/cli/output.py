@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -70,42 +69,6 @@ def shortened(words: Iterable[str], width: int) -> str:
             return f"{line} ...".strip()
         line = f"{line} {word}" if line else word
     return line
-
-
-@contextmanager
-def progress(what: str) -> Iterator[Any]:
-    """Yield a function (done, total) that moves a bar; silent when standard error is no terminal."""
-    if not sys.stderr.isatty():
-        yield lambda done, total: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total)
-
-
-@contextmanager
-def waiting(what: str) -> Iterator[Callable[[float], None] | None]:
-    """Yield a function that shows the time, s, of a simulation; None when standard error is no terminal."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.text import Text  # a plain string would be read as markup
-
-    with Console(stderr=True, highlight=False).status(Text(what)) as status:
-        told = 0
-
-        def show(now: float) -> None:
-            nonlocal told
-            if int(now) > told:
-                told = int(now)
-                status.update(Text(f"{what}: round {told + 1}"))
-
-        yield show
 
 
 def write_text(path: Path, text: str) -> None:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-from contextlib import ExitStack
+from io import BytesIO
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from swarmbid.cli.output import (
@@ -15,9 +14,9 @@ from swarmbid.cli.output import (
     say_json,
     say_table,
     shortened,
-    waiting,
     write_text,
 )
+from swarmbid.cli.waiting import rounds_shown
 from swarmbid.errors import Fault, InputError
 from swarmbid.model import Mission
 
@@ -115,23 +114,23 @@ def _run(
     from swarmbid.simulator import simulate
     from swarmbid.trace import read_trace
 
-    with ExitStack() as stack:
-        if trace is None and recorded:
-            trace = Path(stack.enter_context(TemporaryDirectory(prefix="swarmbid-")), "run.jsonl")
-        say_round = stack.enter_context(waiting(mission.name))
+    kept = BytesIO() if trace is None and recorded else trace
+    with rounds_shown(mission.name) as show:
         try:
-            run = simulate(mission, score=score, trace=trace, progress=say_round, **options)
+            run = simulate(mission, score=score, trace=kept, progress=show, **options)
         except InputError:
             raise
         except Exception as error:
             if score is None or not score.endswith(".py"):
                 raise
-            # Numba puts the cause last, and calls itself by name first.
+            # Numba names itself first and the cause after it.
             said = [line.strip() for line in str(error).splitlines() if "nopython" not in line]
             why = f"fails: {type(error).__name__}: {next(filter(None, said), '')}"
             mend = "It may use arithmetic and `math`, and returns a number for every visit."
             raise InputError([Fault(score, "score", why, mend)]) from None
-        return run, read_trace(trace) if trace is not None and recorded else None
+    if isinstance(kept, BytesIO):
+        kept.seek(0)
+    return run, read_trace(kept) if kept is not None and recorded else None
 
 
 def _tell(mission: Mission, run: Any, plan: Any) -> None:

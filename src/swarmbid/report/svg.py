@@ -8,7 +8,7 @@ import math
 NUM_COLOURS = 8
 # Told apart with every common colour blindness, and from white and near-black alike (after Okabe and Ito,
 # with two of Tol's muted set instead of their yellow and black).
-LIGHT_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#b8569a", "#d08a00", "#3a9fd6", "#882255", "#7d7d1f")
+LIGHT_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#b8569a", "#bf7e00", "#2e90c8", "#882255", "#7d7d1f")
 DARK_COLOURS = ("#4aa8e0", "#f08545", "#2fc49a", "#dd8fc2", "#edb440", "#8fd0f5", "#d0709b", "#c2c25a")
 # Beyond eight agents the colours come again with another dash.
 DASHES = ("", "9 4", "2 4", "10 3 2 3")
