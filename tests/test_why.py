@@ -270,6 +270,14 @@ def test_a_run_that_was_stopped_cannot_be_explained(tmp_path: Path):
         explain(trace, "photo")
 
 
+def test_that_the_agents_did_not_agree_is_said(tmp_path: Path):
+    path = tmp_path / "cut_short.jsonl"
+    network = Network(make_topology("line", len(SITE.agents)))
+    simulate(SITE, network=network, max_rounds=1, trace=path)
+    found = explain(read_trace(path), "photo")
+    assert found.outcome.endswith("But the agents did not agree: the beliefs still differed after 1 rounds.")
+
+
 @pytest.mark.parametrize(
     ("score", "says"),
     [

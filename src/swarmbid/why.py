@@ -123,7 +123,7 @@ def explain(trace: Trace, task_id: str, *, score: str | Score | None = None) -> 
         winner=winner,
         bid=bid,
         start=start,
-        outcome=_outcome(plan, task_id, winner, bid, start),
+        outcome=_outcome(plan, task_id, winner, bid, start) + _doubt(trace),
         history=history,
         others=_others(mission, plan, trace, task, bids, bid, _score(trace, score)),
         in_rounds=trace.header.mode == "rounds",
@@ -187,6 +187,11 @@ def _outcome(plan: Plan, task_id: str, winner: str | None, bid: float | None, st
         if left.task == task_id:
             return f"Done by nobody ({left.reason}). {left.detail}"
     return "Done by nobody."
+
+
+def _doubt(trace: Trace) -> str:
+    result = trace.finished()
+    return "" if result.status == "converged" else f" But the agents did not agree: {result.reason}."
 
 
 def _others(
