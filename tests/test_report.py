@@ -17,7 +17,8 @@ from hypothesis import strategies as st
 
 from swarmbid.missionfile import mission_to_dict
 from swarmbid.model import Agent, Mission, Task
-from swarmbid.plan import AgentPlan, Plan, Unserved, Visit
+from swarmbid.network import Network, make_topology
+from swarmbid.plan import AgentPlan, Plan, Unserved, Visit, make_plan
 from swarmbid.report import render_map_svg, render_report
 from swarmbid.report.charts import MOST_BARS, bids_over_time, messages_over_time, render_bars_svg
 from swarmbid.report.labels import LabelPlacer
@@ -36,8 +37,10 @@ from swarmbid.report.svg import (
     time_step,
 )
 from swarmbid.report.timeline import LEFT, MOST_ROWS, render_timeline_svg, timeline_rows
+from swarmbid.scores import make_score
+from swarmbid.simulator import simulate
 from swarmbid.trace import Agreed, Header, Result, Sent, Taken, TraceWriter, read_trace
-from swarmbid.verify import Violation
+from swarmbid.verify import Violation, verify
 
 SVG = "{http://www.w3.org/2000/svg}"
 VOID = {"meta", "br", "link", "img", "input", "hr"}
@@ -200,7 +203,7 @@ def test_it_says_what_was_agreed_and_checked():
     page = Page(render_report(mission, plan, trace_of(mission, plan, taken(0.0), sent(0.0)), []))
     assert page.text["li"].startswith("AgreedChecked: can be flown as is1 task not served")
     assert "The only agent does 1 of 2 tasks." in page.text["p"]
-    assert "The last task ends after 25 s; the last way home after 35 s." in page.text["p"]
+    assert "The last task ends after 25\u00a0s; the last way home after 35\u00a0s." in page.text["p"]
     assert "Nobody has a place for it." in page.text["td"]
     assert "Rounds to agreement" in page.text["dt"]
 
@@ -281,6 +284,136 @@ def test_a_page_of_many_stays_readable():
     assert [row.agent.id for row in timeline_rows(scene)] == [f"a{row:03}" for row in range(40, 120)]
     page = Page(render_report(scene.mission, scene.plan))
     assert f"Of 120 agents with work, the {MOST_ROWS} that finish last." in page.text["p"]
+
+
+# --- the page of a real run
+
+
+CHARTS = ("chart-map", "chart-time")
+NASTY = "</script><b>\"&'"
+
+
+def team(**mission: Any) -> Mission:
+    """Two agents with room for one task each; t1 and t2 lie beside them, t3 between, t4 needs an arm."""
+    fades = {"discount": 0.01}
+    return Mission(
+        agents=(agent("left", bundle_limit=1), agent("right", 300.0, bundle_limit=1)),
+        tasks=(
+            task("t1", 10.0, **fades),
+            task("t2", 290.0, **fades),
+            task("t3", 150.0, **fades),
+            task("t4", 150.0, 40.0, type=NASTY, equipment=frozenset({"arm"})),
+        ),
+        **mission,
+    )
+
+
+def page_of(mission: Mission, **options: Any) -> str:
+    """What ``swarmbid simulate --report`` writes."""
+    file = io.BytesIO()
+    run = simulate(mission, trace=file, **options)
+    file.seek(0)
+    return render_report(mission, run.plan, read_trace(file), verify(mission, run.plan, run.score))
+
+
+def drawings(text: str) -> list[ElementTree.Element]:
+    """Every inline drawing of a page, parsed as the XML that it must be."""
+    found = re.findall(r"<svg\b.*?</svg>", text, re.DOTALL)
+    assert len(found) == text.count("<svg") == text.count("</svg>")
+    return [tree(one) for one in found]
+
+
+def cells(text: str, heading: str) -> list[list[str]]:
+    """The rows of the table under a heading, as text."""
+    section = text.split(f"<h2>{heading}</h2>")[1].split("</section>")[0]
+    return [
+        [re.sub(r"<[^>]*>", "", cell) for cell in re.findall(r"<td\b.*?</td>", row)]
+        for row in re.findall(r"<tr\b.*?</tr>", section)
+        if "<td" in row
+    ]
+
+
+def test_a_real_run_shows_every_agent_every_task_and_why_some_are_left():
+    """Each agent takes the task 10 m away; nobody has room for t3, nobody the arm for t4."""
+    text = page_of(team())
+    listed = re.findall(r'<li class="a\d" data-agent="([^"]*)" tabindex="0">', text)
+    assert listed == ["left", "right"]
+    chart, timeline = (next(one for one in drawings(text) if one.get("class") == css) for css in CHARTS)
+    told = [item.text.split(" (")[0] for item in chart.iter(f"{SVG}title") if ", reward " in item.text]
+    assert told == ["t1", "t2", "t3", "t4"]
+    assert [item.text for item in by_class(timeline, "row")] == ["left", "right"]
+    assert [row[2] for row in cells(text, "Who, what, when")] == ["t1", "done", "t2", "done"]
+    assert [(row[0], row[3], row[4]) for row in cells(text, "Not served")] == [
+        ("t3", "no room", "Agents able to do it: 2 with a full bundle."),
+        ("t4", "no capable agent", "It needs arm; no agent that may do it carries all of that."),
+    ]
+    assert Page(text).text["li"].startswith("AgreedChecked: can be flown as is2 tasks not served")
+
+
+def test_a_real_run_that_is_stopped_early_says_so():
+    """At the ends of a line of three, nobody has heard of the other end after one round."""
+    mission = Mission(agents=tuple(agent(name) for name in "abc"), tasks=(task("t1", 10.0), task("t2", 20.0)))
+    page = Page(page_of(mission, network=Network(make_topology("line", 3)), max_rounds=1))
+    assert page.text["li"].startswith("Not agreedChecked: breaks no rule")
+    assert "the beliefs still differed" in page.text["p"]
+    assert "They had not agreed when they were stopped" in page.text["p"]
+    assert "They agreed" not in page.text["p"]
+    assert "Rounds to agreement" not in page.text["dt"]
+
+
+def test_a_real_plan_that_breaks_a_window_is_shown_with_the_violation():
+    """100 m at 10 m/s are 10 s, 5 s after the window has closed."""
+    mission = Mission(agents=(agent("a"),), tasks=(task("t1", 100.0, end=5.0),))
+    score = make_score("time_discounted")
+    plan = make_plan(mission, {"a": [("t1", 10.0)]}, score, "cbba", "hold")
+    text = render_report(mission, plan, None, verify(mission, plan, score))
+    assert cells(text, "Check") == [["a", "t1", "window", "starts at 10.0 s, the window is 0.0 to 5.0 s"]]
+    assert '<li class="badge bad">Checked: 1 violation</li>' in text
+
+
+@pytest.mark.parametrize("names", ["field", NASTY])
+def test_every_drawing_of_every_page_is_well_formed(names: str):
+    """The map, the timeline, two charts, and a swatch for each agent and sign."""
+    one = drawings(page_of(team(name=names)))
+    # 4 charts, 2 agents, and 4 signs: two types of task, what is not served, where agents start.
+    assert len(one) == 10
+    ElementTree.fromstring(render_map_svg(team(name=names), simulate(team(name=names)).plan))
+
+
+def test_a_real_run_with_nasty_names_keeps_them_text():
+    page = Page(page_of(team(name=NASTY)))
+    names = [name for name, _ in page.elements]
+    assert names.count("script") == 1
+    # The <b> of the name would be one more than agents in the list and tasks in the table of what is left.
+    assert names.count("b") == 2 + 2
+    assert page.open == []
+    assert page.text["h1"] == NASTY
+    assert NASTY in page.text["title"]
+    assert NASTY in page.text["td"]
+
+
+@pytest.mark.parametrize(
+    ("num_agents", "num_tasks", "says"),
+    [
+        (0, 0, "There is nothing to do."),
+        (1, 0, "There is nothing to do."),
+        (0, 1, "Nobody does anything; 1 task left."),
+        (1, 1, "The only agent does the only task."),
+    ],
+)
+def test_real_runs_of_none_and_one_have_a_page(num_agents: int, num_tasks: int, says: str):
+    mission = Mission(agents=(agent("a"),) * num_agents, tasks=(task("t1", 10.0),) * num_tasks)
+    text = page_of(mission)
+    page = Page(text)
+    assert page.open == []
+    assert says in page.text["p"]
+    assert len(drawings(text)) >= 2
+    assert text.count('data-agent="a" tabindex') == num_agents
+    assert ("t1 (task), reward 1" in text) == (num_tasks == 1)
+
+
+def test_two_runs_with_one_seed_have_equal_pages():
+    assert page_of(team(), mode="asynchronous", seed=5) == page_of(team(), mode="asynchronous", seed=5)
 
 
 # --- the map
@@ -372,6 +505,41 @@ def test_labels_cover_neither_each_other_nor_markers_nor_the_edge(
         for box in boxes:
             assert label[0] >= box[2] or label[2] <= box[0] or label[1] >= box[3] or label[3] <= box[1]
         boxes.append(label)
+
+
+def test_a_name_stays_clear_of_the_outline_of_a_window():
+    """Its half diagonal is (8.5 + 3.2) * 1.22 = 14.3 px, and a gap of 4 px follows."""
+    windows = [task(f"t{k}", 100.0 * k, type=kind, end=90.0) for k, kind in enumerate(["a", "a", "b", "c"])]
+    mission = Mission(agents=(agent("uav1", 0.0, 50.0),), tasks=tuple(windows))
+    stops = (visit("t3", 31.0, 31.0, 31.0, 304.0),)
+    root = tree(
+        render_map_svg(mission, plan_of(AgentPlan("uav1", stops, 304.0, 31.0, 1.0)), standalone=False)
+    )
+    [outline] = by_class(root, "window")
+    corners = [tuple(map(float, point.split(","))) for point in outline.get("points").split()]
+    [name] = [item for item in by_class(root, "name") if item.text == "t3"]
+    middle = sum(x for x, _ in corners) / 4
+    assert max(x for x, _ in corners) - middle == pytest.approx(14.3, abs=0.1)
+    assert float(name.get("x")) - middle == pytest.approx(18.3, abs=0.1)
+
+
+def test_a_name_to_the_left_of_its_point_ends_there():
+    """The only leg goes right, from x = 0 to 100 m: the agent's name stands to the left of it."""
+    mission = Mission(agents=(agent("uav1"),), tasks=(task("t1", 100.0), task("t2", -50.0)))
+    does = AgentPlan("uav1", (visit("t1", 10.0, 10.0, 10.0, 100.0),), 100.0, 10.0, 1.0)
+    root = tree(render_map_svg(mission, plan_of(does), standalone=False))
+    [start] = by_class(root, "origin")
+    [name] = by_class(root, "place")[:1]
+    assert name.text == "uav1"
+    assert name.get("text-anchor") == "end"
+    # 9 px that the sign reaches out, and a gap of 4 px.
+    assert float(name.get("x")) == pytest.approx(float(start.get("cx")) - 13.0, abs=0.1)
+
+
+@pytest.mark.parametrize(("base", "shown"), [((0.0, 0.0, 0.0), False), ((9.0, 0.0, 0.0), True), (None, True)])
+def test_the_signs_tell_a_start_that_is_no_base(base: tuple[float, float, float] | None, shown: bool):
+    mission = Mission(agents=(agent("a", base=base),), tasks=(task("t1", 100.0),))
+    assert ("start of an agent" in render_report(mission, plan_of())) == shown
 
 
 def test_a_label_leaves_a_line_free_where_it_can():

@@ -32,6 +32,9 @@ MOST_LABELS = 160
 MOST_ORDERS = 400
 MOST_LEGEND = 24
 NAME_SIZE = 10.5
+WINDOW_GAP = 3.2  # px between a marker and the dashed outline of its window
+POINTED = 1.22  # how much further a diamond or triangle reaches than a circle of the same weight
+SMALL = 5.0  # px; smaller markers carry neither number nor window
 SHAPES = ("circle", "square", "diamond", "triangle")
 
 
@@ -87,7 +90,7 @@ def marker(shape: str, x: float, y: float, radius: float, css: str) -> str:
     if shape == "square":
         half = radius * 0.9
         return tag("rect", x=x - half, y=y - half, width=2 * half, height=2 * half, rx=2, class_=css)
-    reach = radius * 1.22
+    reach = radius * POINTED
     if shape == "diamond":
         points = [(x, y - reach), (x + reach, y), (x, y + reach), (x - reach, y)]
     else:
@@ -215,9 +218,10 @@ def _places(frame: _Frame, scene: Scene) -> list[str]:
         for (x1, y1), (x2, y2) in pairwise([frame.at(row.agent.position), *stops]):
             placer.avoid(x1, y1, x2, y2)
     parts = []
+    reach = {task.id: _reach(scene, task, shapes[task.type], radius) for task in scene.mission.tasks}
     for task in scene.mission.tasks:
-        x, y = frame.at(task.position)
-        placer.block(x - radius, y - radius, x + radius, y + radius)
+        (x, y), room = frame.at(task.position), reach[task.id]
+        placer.block(x - room, y - room, x + room, y + room)
     for task in scene.mission.tasks:
         parts.append(_task(frame, scene, task, shapes[task.type], radius, numbered=num_tasks <= MOST_ORDERS))
     names: list[tuple[float, float, float, str, str]] = []
@@ -229,12 +233,38 @@ def _places(frame: _Frame, scene: Scene) -> list[str]:
         for task in scene.mission.tasks:
             x, y = frame.at(task.position)
             css = "name" if task.id in scene.served else "name missed-name"
-            names.append((x, y, radius, shorten(task.id, 22), css))
+            names.append((x, y, reach[task.id], shorten(task.id, 22), css))
     for x, y, room, text, css in names:
-        spot = placer.place(x, y, room, len(text) * NAME_SIZE * CHARACTER_EM, NAME_SIZE)
+        spot = placer.place(x, y, room, _width(text), NAME_SIZE)
         if spot is not None:
-            parts.append(tag("text", escape(text), x=spot[0], y=spot[1], class_=css))
+            parts.append(_name(x, spot, text, css))
     return parts
+
+
+def _reach(scene: Scene, task: Task, shape: str, radius: float) -> float:
+    """Return how far a task's marker reaches out, px, its dashed window included."""
+    if has_window(task) and radius > SMALL and task.id in scene.served:
+        radius += WINDOW_GAP
+    return radius * POINTED if shape in ("diamond", "triangle") else radius
+
+
+def _name(x: float, spot: tuple[float, float], text: str, css: str) -> str:
+    """Write a name; one to the left of its point ends there, so that larger type grows away from it."""
+    left, base = spot
+    width = _width(text)
+    ends = left + width < x
+    return tag(
+        "text",
+        escape(text),
+        x=left + width if ends else left,
+        y=base,
+        text_anchor="end" if ends else None,
+        class_=css,
+    )
+
+
+def _width(name: str) -> float:
+    return len(name) * NAME_SIZE * CHARACTER_EM
 
 
 def _task(frame: _Frame, scene: Scene, task: Task, shape: str, radius: float, *, numbered: bool) -> str:
@@ -245,8 +275,8 @@ def _task(frame: _Frame, scene: Scene, task: Task, shape: str, radius: float, *,
         told.append(f"start of service from {clock(task.start)}{closes}")
     visits = scene.served.get(task.id, [])
     if not visits:
-        reason = next((left.detail for left in scene.plan.unserved if left.task == task.id), "")
-        told.append(f"not served. {reason}".rstrip())
+        left = scene.reasons.get(task.id)
+        told.append(f"not served. {left.detail if left else ''}".rstrip())
         reach = radius * 0.42
         inner = tag("title", escape("\n".join(told))) + marker(shape, x, y, radius * 0.95, "missed")
         inner += tag(
@@ -262,10 +292,10 @@ def _task(frame: _Frame, scene: Scene, task: Task, shape: str, radius: float, *,
     ]
     row, place, _ = visits[0]
     inner = tag("title", escape("\n".join(told)))
-    if has_window(task) and radius > 5.0:
-        inner += marker(shape, x, y, radius + 3.2, "window")
+    if has_window(task) and radius > SMALL:
+        inner += marker(shape, x, y, radius + WINDOW_GAP, "window")
     inner += marker(shape, x, y, radius, "stop")
-    if numbered and radius > 5.0:
+    if numbered and radius > SMALL:
         shown = str(place + 1) if len(visits) == 1 else f"×{len(visits)}"
         size = radius + 1.5 if len(shown) < 2 else radius
         middle = y + (radius * 0.22 if shape == "triangle" else 0.0)

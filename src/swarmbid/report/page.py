@@ -98,9 +98,9 @@ def _lead(scene: Scene, metrics: Metrics | None) -> str:
     agents = _of(len(busy), len(scene.rows), "agent")
     does = "does" if len(busy) == 1 else "do"
     parts = [f"{agents[0].upper()}{agents[1:]} {does} {_of(served, total, 'task')}."]
-    ends = f"The last task ends after {span_of(scene.makespan)}"
+    ends = f"The last task ends after {_unbroken(scene.makespan)}"
     back = [row.plan.finish for row in busy if row.agent.base is not None]
-    parts.append(f"{ends}; the last way home after {span_of(max(back))}." if back else f"{ends}.")
+    parts.append(f"{ends}; the last way home after {_unbroken(max(back))}." if back else f"{ends}.")
     if metrics is not None and metrics.status != "converged":
         parts.append(
             "They had not agreed when they were stopped; what several meant to do is shown with the "
@@ -111,6 +111,11 @@ def _lead(scene: Scene, metrics: Metrics | None) -> str:
             f"They agreed on it among themselves, without a leader, in {count(metrics.rounds, 'round')}."
         )
     return " ".join(parts)
+
+
+def _unbroken(seconds: float) -> str:
+    """Write a length of time that no line break parts."""
+    return span_of(seconds).replace(" ", "\u00a0")
 
 
 def _of(part: int, whole: int, what: str) -> str:
@@ -202,6 +207,8 @@ def _legend(scene: Scene) -> str:
             "path", d="M10 5l6 6m-6 0l6-6", class_="cross"
         )
         entries.append((cross, "not served"))
+    if any(row.agent.base != row.agent.position for row in scene.rows):
+        entries.append((tag("circle", cx=13, cy=8, r=5, class_="origin shared"), "start of an agent"))
     if any(row.agent.base is not None for row in scene.rows):
         entries.append((tag("path", d="M4 8l9-8 9 8h-2.5v7h-13v-7z", class_="base"), "base"))
         home = tag("line", x1=1, y1=8, x2=25, y2=8, class_="home shared")
@@ -229,10 +236,9 @@ def _timeline(scene: Scene) -> str:
 def _unserved(scene: Scene) -> str:
     if not scene.unserved:
         return ""
-    why = {left.task: left for left in scene.plan.unserved}
     rows = []
     for task in scene.unserved[:MOST_LISTED]:
-        left = why.get(task.id)
+        left = scene.reasons.get(task.id)
         reason = escape(left.reason.replace("_", " ")) if left else ""
         detail = escape(left.detail) if left else ""
         rows.append(

@@ -8,6 +8,7 @@ from functools import cached_property
 
 from swarmbid.model import Agent, Mission, Task
 from swarmbid.plan import AgentPlan, Plan, Visit
+from swarmbid.unserved import Unserved
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,11 @@ class Scene:
         """Tasks that nobody visits, in order of id."""
         left = [task for task in self.mission.tasks if task.id not in self.served]
         return sorted(left, key=lambda task: task.id.encode())
+
+    @cached_property
+    def reasons(self) -> dict[str, Unserved]:
+        """Task id -> why the plan leaves it out."""
+        return {left.task: left for left in self.plan.unserved}
 
     @cached_property
     def makespan(self) -> float:

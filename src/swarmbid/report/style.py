@@ -86,8 +86,8 @@ header{{margin-bottom:20px}}
 h1{{font-size:30px;line-height:1.2;letter-spacing:-.015em;margin:4px 0 8px;overflow-wrap:anywhere}}
 h2{{font-size:17px;letter-spacing:-.005em;margin:0 0 4px}}
 p{{margin:0 0 10px}}
-.lead{{font-size:16.5px;max-width:74ch;margin:0}}
-.hint{{color:var(--soft);font-size:13px;max-width:95ch;margin:0 0 12px}}
+.lead{{font-size:16.5px;max-width:74ch;margin:0;text-wrap:pretty}}
+.hint{{color:var(--soft);font-size:13px;max-width:110ch;margin:0 0 12px;text-wrap:pretty}}
 .badges{{display:flex;flex-wrap:wrap;gap:8px;margin:14px 0 0;padding:0;list-style:none}}
 .badge{{font-size:13px;font-weight:600;padding:3px 11px;border-radius:99px;
  background:var(--good-bg);color:var(--good)}}
@@ -131,15 +131,15 @@ footer{{color:var(--soft);font-size:12.5px;margin-top:22px}}
 .focus .agents [data-agent]:not(.on),.focus tr[data-agent]:not(.on){{opacity:.45}}
 @media (max-width:820px){{
  .map,.charts{{grid-template-columns:minmax(0,1fr)}}
- .agents{{max-height:none}}
+ .agents{{max-height:380px}}
 }}
 @media (max-width:620px){{
  main{{padding:20px 12px 32px}} section{{padding:14px 12px}} h1{{font-size:24px}} .lead{{font-size:15px}}
  .figures{{grid-template-columns:1fr 1fr}} .figures div{{padding:10px 12px}} .figures dd{{font-size:18px}}
  .chart-map .name:not(.place){{display:none}}
- .chart-map text{{font-size:20px}} .chart-map .place{{font-size:15px}}
+ .chart-map text{{font-size:18px}} .chart-map .place{{font-size:16px}} .chart-map{{overflow:visible}}
  .chart-map .leg{{stroke-width:3.4}}
- .chart-time{{min-width:760px}}
+ .chart-time{{min-width:1000px}} .bars text{{font-size:14px}}
  td,th{{padding:5px 6px}}
 }}
 @media print{{
