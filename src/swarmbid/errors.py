@@ -54,8 +54,14 @@ class Fault:
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Return "Did you mean 'x'?" for the nearest of `known`, or an empty string."""
+    near = nearest(name, known)
+    return "" if near is None else f"Did you mean {near!r}?"
+
+
+def nearest(name: str, known: Iterable[str]) -> str | None:
+    """Return the one of `known` that `name` was most likely meant to be, if any."""
     names = sorted(known)
     # What was cut short is more likely meant than what looks alike.
-    near = [one for one in names if name and one.startswith(name)][:1]
+    near = [one for one in names if name and one.startswith(name)]
     near = near or difflib.get_close_matches(name, names, n=1)
-    return f"Did you mean {near[0]!r}?" if near else ""
+    return near[0] if near else None

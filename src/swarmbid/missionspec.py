@@ -7,13 +7,13 @@ checked by `swarmbid.model` alone; the schema repeats them for editors. Importin
 
 from __future__ import annotations
 
-import difflib
 import re
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError
 
+from swarmbid.errors import nearest
 from swarmbid.missiontext import Path
 
 Number = Annotated[float, Field(strict=True)]
@@ -176,8 +176,7 @@ def meant_name(word: str, known: list[str]) -> str | None:
     synonym = _SYNONYMS.get(word.lower())
     if synonym in known:
         return synonym
-    close = difflib.get_close_matches(word.lower(), known, n=1, cutoff=0.6)
-    return close[0] if close else None
+    return nearest(word.lower(), known)
 
 
 def show(value: Any) -> str:

@@ -47,15 +47,14 @@ class BeliefTable:
         arrays = self.arrays
         self._digest[0] = consensus.digest_of(arrays.task_hash, arrays.agent_hash, self.winner, self._bits)
 
-    def resolve(self, rules: NDArray[np.int8], sender: int, message: Beliefs, heard: StampArray) -> bool:
-        """Apply a message; return whether a belief changed. `heard` : the sender's stamps, by row."""
+    def resolve(self, rules: NDArray[np.int8], sender: int, message: Beliefs, heard: StampArray) -> None:
+        """Apply a message. `heard` : the sender's stamps, by row."""
         arrays = self.arrays
-        changes: int = consensus.resolve(
+        consensus.resolve(
             rules, self.me, sender, message.full, self.winner, self.bid, self._bits, self.heard, self.flags,
             arrays.task_hash, arrays.agent_hash, self._digest,
             message.tasks, message.winners, message.bids, heard,
         )  # fmt: skip
-        return changes > 0
 
     def compose(self, full: bool, told: StampArray) -> tuple[IntArray, IntArray, FloatArray, StampArray]:
         """Return the columns of the next message; see `swarmbid.kernels.wire.compose`."""
@@ -70,14 +69,13 @@ class BeliefTable:
         """Return the rows that carry `flag`, and take it off them."""
         return consensus.take_flagged(self.flags, flag)  # type: ignore[no-any-return]
 
-    def claim(self, before: NDArray[np.int64], order: Any, marks: Any, length: int) -> bool:
-        """Make the beliefs agree with the agent's new bundle; return whether one changed."""
+    def claim(self, before: NDArray[np.int64], order: Any, marks: Any, length: int) -> None:
+        """Make the beliefs agree with the agent's new bundle."""
         arrays = self.arrays
-        changes: int = consensus.claim(
+        consensus.claim(
             self.me, before, order, marks, length, self.winner, self.bid, self._bits, self.flags,
             arrays.task_hash, arrays.agent_hash, self._digest,
         )  # fmt: skip
-        return changes > 0
 
     def set(self, row: int, winner: int, bid: float) -> None:
         """Set one belief, to be sent and weighed."""
@@ -88,12 +86,11 @@ class BeliefTable:
         )  # fmt: skip
         self.flags[row] |= consensus.TO_SEND | consensus.TO_WEIGH
 
-    def open_all_of(self, agent: int) -> bool:
-        """Forget every win of an agent that is gone, but for what is done; return whether there was one."""
+    def open_all_of(self, agent: int) -> None:
+        """Forget every win of an agent that is gone, but for what is done."""
         rows = np.flatnonzero((self.winner == agent) & (self.bid < DONE_BID))
         for row in rows.tolist():
             self.set(row, NO_AGENT, 0.0)
-        return rows.size > 0
 
     def as_dict(self) -> dict[str, tuple[str | None, float]]:
         """Task id -> (winner's id or None, winning bid)."""

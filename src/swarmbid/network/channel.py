@@ -94,15 +94,6 @@ class Network:
         faults = self.loss or self.delay or self.duplicate or self.replay or self._barriers or self.freeze
         self._ideal = None if faults else self._kept_links
 
-    @property
-    def lossless(self) -> bool:
-        """Whether every broadcast reaches the same receivers, all of them, always.
-
-        Then nobody ever misses a change, however late it comes. Not so with loss or cuts, nor when
-        agents move in and out of range.
-        """
-        return self.loss == 0.0 and not self._barriers and self.topology.static
-
     def deliveries(self, sender: int, now: float) -> Deliveries:
         """Decide the fate of one broadcast; call once for each, as random numbers are drawn.
 
