@@ -1,6 +1,7 @@
 """Run the benchmarks: `python -m benchmarks [--quick] [--write PAGE] [name ...]`.
 
-The names are insertion, runs, scale and startup; all by default. Exit status 1 if a promise was missed.
+The names are insertion, runs, scale, startup and coalitions; all by default.
+Exit status 1 if a promise was missed.
 """
 
 from __future__ import annotations
@@ -12,13 +13,13 @@ from pathlib import Path
 
 from benchmarks.measure import Table, describe_machine
 
-NAMES = ("insertion", "runs", "scale", "startup")
+NAMES = ("insertion", "runs", "scale", "startup", "coalitions")
 
 INTRODUCTION = """# Benchmarks
 
 Figures of one machine on one day; `make bench` measures them again, and `python -m benchmarks --write
-docs/benchmarks.md` rewrites this page. The machine is shared and noisy: figures are medians, the sides of a
-comparison take turns in one run, and ratios mean more than seconds.
+PAGE`, with the names of the tables wanted, rewrites this page. The machine is shared and noisy: figures are
+medians, the sides of a comparison take turns in one run, and ratios mean more than seconds.
 """
 
 

@@ -53,7 +53,7 @@ def repeat_evaluate(  # type: ignore[no-untyped-def]
             count = min(BLOCK, num_tasks - first)
             insertion.evaluate(
                 tasks, columns[first:], count, agent, path, length, starts, legs, values, total, rule,
-                gain[first:], position[first:], times[first:],
+                0, length, gain[first:], position[first:], times[first:],
             )  # fmt: skip
 
 

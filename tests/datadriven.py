@@ -45,11 +45,18 @@ from swarmbid.scores import make_score
 ALGORITHMS = {"cbba": CBBA, "cbaa": CBAA}
 MOST_ROUNDS = 30
 
+Holders = tuple[tuple[str, float], ...]
 
-def run_file(path: Path, *, rewrite: bool = False) -> tuple[str, str]:
-    """Play the conversation in `path`; return (what the file says, what was really said)."""
+
+def run_file(
+    path: Path, conversation: Conversation | None = None, *, rewrite: bool = False
+) -> tuple[str, str]:
+    """Play the conversation in `path`; return (what the file says, what was really said).
+
+    `conversation` : how its messages read; those of the algorithm that the folder names by default.
+    """
     text = path.read_text(encoding="utf-8")
-    conversation = Conversation(path.parent.name)
+    conversation = conversation or Conversation(path.parent.name)
     played = "\n\n".join(_play(conversation, block) for block in text.strip().split("\n\n")) + "\n"
     if rewrite and played != text:
         path.write_text(played, encoding="utf-8")
@@ -200,8 +207,8 @@ class Conversation:
         for task_id in self.arrays.task_ids:
             listed = self.arrays.task_row[task_id] in message.tasks.tolist()
             if listed or message.full:
-                theirs = self._listed(message).get(task_id, (None, 0.0))
-                row = row_of(receiver, sender, theirs[0], before[task_id][0])
+                theirs = self._listed(message).get(task_id, ())
+                row = row_of(receiver, sender, holder(theirs), holder(before[task_id]))
                 change = f"{belief_text(before[task_id])} -> {belief_text(after[task_id])}"
                 kept = "stays " + belief_text(after[task_id])
                 lines.append(f"{task_id}: row {row}: {kept if before[task_id] == after[task_id] else change}")
@@ -300,9 +307,9 @@ class Conversation:
         words = {True: "agrees", False: "does not know yet"}
         return [f"{agent_id} {words[agent.agreed]}" for agent_id, agent in self.agents.items()]
 
-    def _listed(self, message: Beliefs) -> dict[str, tuple[str | None, float]]:
+    def _listed(self, message: Beliefs) -> dict[str, Holders]:
         return {
-            message.task_ids[row]: (None if winner == NOBODY else message.agent_ids[winner], bid)
+            message.task_ids[row]: () if winner == NOBODY else ((message.agent_ids[winner], bid),)
             for row, winner, bid in zip(
                 message.tasks.tolist(), message.winners.tolist(), message.bids.tolist(), strict=True
             )
@@ -326,9 +333,13 @@ class Conversation:
         return f"{stamp_text(message.sequence)} ({kind}): " + ("; ".join(parts) or "nothing")
 
 
-def belief_text(belief: tuple[str | None, float]) -> str:
-    winner, bid = belief
-    return "nobody" if winner is None else f"{winner} {bid:.6g}"
+def holder(holders: Holders) -> str | None:
+    """The one that holds a task of one seat."""
+    return holders[0][0] if holders else None
+
+
+def belief_text(holders: Holders) -> str:
+    return " ".join(f"{holder} {bid:.6g}" for holder, bid in holders) or "nobody"
 
 
 def event_text(event: Event) -> str:
@@ -336,7 +347,7 @@ def event_text(event: Event) -> str:
         case TaskTaken(task, bid, position, start):
             return f"takes {task} for {bid:.6g}, place {position}, start {start:g} s"
         case TaskOutbid(task, bid, by, by_bid):
-            return f"is outbid on {task} ({bid:.6g}) by {belief_text((by, by_bid))}"
+            return f"is outbid on {task} ({bid:.6g}) by {belief_text(((by, by_bid),))}"
         case TaskReleased(task, because):
             return f"releases {task}" + (f" because of {because}" if because else "")
         case MessageDropped(sender, reason):

@@ -56,7 +56,11 @@ class Fleet:
         self.round = self.last_change = 0
 
     def state(self) -> dict[str, Beliefs]:
-        return {i: agent.beliefs() for i, agent in self.agents.items()}
+        """Who wins what, in the twins' words: one winner a task, or None."""
+        return {
+            i: {task: holders[0] if holders else (None, 0.0) for task, holders in agent.beliefs().items()}
+            for i, agent in self.agents.items()
+        }
 
     def play_round(self) -> None:
         """Everybody ticks, in order of id, then everything due is delivered, in order of arrival."""

@@ -14,6 +14,8 @@ from swarmbid import registry
 from swarmbid.algorithms._auction import STARTED_BID
 from swarmbid.algorithms.cbaa import CBAA
 from swarmbid.algorithms.cbba import CBBA
+from swarmbid.algorithms.cbga import CBGA
+from swarmbid.algorithms.cbga_printed import CBGAPrinted
 from swarmbid.arrays import PEAK, REWARD, FloatArray, MissionArrays
 from swarmbid.messages import Message
 from swarmbid.model import Agent, Mission, Task
@@ -41,6 +43,15 @@ VARIANTS: dict[str, tuple[type[Negotiator], dict[str, Any]]] = {
     "cbba reception": (CBBA, {"stamps": "reception"}),
     "cbaa": (CBAA, {}),
     "cbaa hold": (CBAA, HOLD),
+    "cbga": (CBGA, {}),
+    "cbga append": (CBGA, {"insertion": "append", "score": make_score("distance_cost")}),
+    "cbga team rewards": (CBGA, {"team_rewards": True, "dissolve": 1.0}),
+    # As printed, and to the letter, it keeps no such contract: see test_cbga_printed.
+    "cbga_printed": (CBGAPrinted, {"warp": True}),
+    "cbga_printed quitting": (
+        CBGAPrinted,
+        {"warp": True, "quitting": True, "quit_after": 4.0, "team_rewards": True},
+    ),
 }
 
 
@@ -68,6 +79,7 @@ SCORES = {
     "distance_cost weighted": make_score("distance_cost", metre_cost=0.25, second_cost=0.0),
     "time_window": make_score("time_window"),
     "revisit": make_score("revisit"),
+    "early_finish": make_score("early_finish"),
 }
 
 
@@ -280,7 +292,7 @@ class Gullible(CBBA):
     ("broken", "check", "words"),
     [
         (Overconfident, "never_agrees_unheard", "heard nobody says after 0 s that all agree"),
-        (Overconfident, "agrees", "both plan t"),
+        (Overconfident, "agrees", "all plan t"),
         (Overconfident, "takes_duplicates", "all say that they agree, but their digests differ"),
         (Stubborn, "agrees", "did not agree within 400 rounds"),
         (Hasty, "drops_old_messages", "on messages that it already had"),
@@ -297,7 +309,7 @@ class Gullible(CBBA):
         (Shy, "agrees_on_bad_links", "did not agree within 400 rounds"),
         (Forgetful, "add_task", "nobody does a new task"),
         (Deaf, "cancel_task", "still plans a cancelled task"),
-        (Obliging, "start_task", "both plan t"),
+        (Obliging, "start_task", "all plan t"),
         (Zealous, "finish_task", "plans to do a task that a0 has finished"),
         (Reopening, "finish_task", "does a task again that was finished, because a0 left"),
         (Elsewhere, "set_position", "a path cannot be flown"),

@@ -368,6 +368,54 @@ def test_equipment_of_a_group_may_come_from_several_agents(tmp_path):
     assert load_mission(write(tmp_path, text)).tasks[0].agents_required == 2
 
 
+def test_seats_may_be_left_to_the_equipment(tmp_path):
+    """0 agents: as many as it takes to bring camera and thermal."""
+    text = (
+        "agents:\n- {id: a, position: [0,0,0], equipment: [camera]}\n"
+        "- {id: b, position: [0,0,0], equipment: [thermal]}\n"
+        "tasks:\n- {id: t, position: [0,0,0], equipment: [camera, thermal], agents_required: 0}\n"
+    )
+    assert load_mission(write(tmp_path, text)).tasks[0].agents_required == 0
+
+
+@pytest.mark.parametrize("equipment", [[], None])
+def test_schema_and_reader_refuse_no_seats_without_equipment(equipment):
+    task = {"id": "t", "position": [0, 0, 0], "agents_required": 0}
+    data = {"agents": [], "tasks": [task if equipment is None else task | {"equipment": equipment}]}
+    assert not jsonschema.Draft202012Validator(mission_schema()).is_valid(data)
+    with pytest.raises(InputError) as caught:
+        mission_from_dict(data)
+    assert [fault.field for fault in caught.value.faults] == ["tasks[0].agents_required"]
+
+
+@pytest.mark.parametrize("equipment", ["camera", [1], [""]])
+def test_faulty_equipment_is_not_taken_for_none(equipment):
+    """Of the shape or of the model: the one fault is that of the equipment."""
+    task = {"id": "t", "position": [0, 0, 0], "agents_required": 0, "equipment": equipment}
+    with pytest.raises(InputError) as caught:
+        mission_from_dict({"agents": [], "tasks": [task]})
+    (fault,) = caught.value.faults
+    assert fault.field.startswith("tasks[0].equipment")
+
+
+def test_seats_that_no_group_can_fill_are_refused(tmp_path):
+    """Three of the four agents may lift; two of them cannot bring three things of which each has one."""
+    text = (
+        "compatible: {scout: [look]}\n"
+        "agents:\n- {id: a, position: [0,0,0], equipment: [hook]}\n"
+        "- {id: b, position: [0,0,0], equipment: [rope]}\n- {id: c, position: [0,0,0], equipment: [lamp]}\n"
+        "- {id: d, type: scout, position: [0,0,0]}\n"
+        "tasks:\n- {id: t, type: lift, position: [0,0,0], agents_required: 4}\n"
+        "- {id: u, type: lift, position: [0,0,0], agents_required: 2, equipment: [hook, rope, lamp]}\n"
+    )
+    with pytest.raises(InputError) as caught:
+        load_mission(write(tmp_path, text))
+    assert [(fault.field, fault.why) for fault in caught.value.faults] == [
+        ("tasks[0].agents_required", "is 4, but there are 4 agents, of whom 3 may do it"),
+        ("tasks[1].agents_required", "is 2, but to bring hook, lamp, rope takes 3 agents"),
+    ]
+
+
 def test_program_may_make_what_a_file_may_not():
     """A running fleet may yet be joined by who carries a crane, so plain data passes."""
     data = {
@@ -441,6 +489,7 @@ def missions(draw: st.DrawFn) -> Mission:
     for task_id in draw(st.lists(ids.filter(lambda i: i not in taken), max_size=4, unique=True)):
         start = draw(times)
         earlier = [task.id for task in tasks]
+        needs = draw(equipment)
         tasks.append(
             Task(
                 id=task_id,
@@ -451,8 +500,8 @@ def missions(draw: st.DrawFn) -> Mission:
                 end=draw(st.floats(start, 2e5) | st.just(math.inf)),
                 duration=draw(times),
                 discount=draw(times),
-                agents_required=draw(st.integers(1, 4)),
-                equipment=draw(equipment),
+                agents_required=draw(st.integers(0 if needs else 1, 4)),
+                equipment=needs,
                 prerequisites=tuple(draw(st.lists(st.sampled_from(earlier), unique=True)) if earlier else ()),
                 revisit_at=draw(st.none() | times),
                 revisit_width=draw(positive),
@@ -627,7 +676,7 @@ def test_schema_and_reader_accept_the_examples(path):
         ("tasks", "end", -1),
         ("tasks", "duration", -1),
         ("tasks", "discount", -1),
-        ("tasks", "agents_required", 0),
+        ("tasks", "agents_required", -1),
         ("tasks", "revisit_at", -1),
         ("tasks", "revisit_width", 0),
         ("tasks", "equipment", "camera"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 
 import numpy as np
 import pytest
@@ -10,7 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarmbid.errors import InputError
-from swarmbid.model import Agent, Mission, Origin, Task, distance, prerequisite_cycle
+from swarmbid.model import (
+    Agent,
+    Mission,
+    Origin,
+    Task,
+    distance,
+    fewest_sets,
+    find_circle,
+    prerequisite_cycle,
+)
 
 
 def make_task(task_id: str, **fields: object) -> Task:
@@ -24,7 +34,7 @@ def test_distance_is_euclidean_in_three_dimensions():
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("reward", 0.0), ("reward", math.nan), ("start", -1.0), ("duration", math.inf), ("agents_required", 0)],
+    [("reward", 0.0), ("reward", math.nan), ("start", -1.0), ("duration", math.inf), ("agents_required", -1)],
 )
 def test_bad_task_field_is_named(field, value):
     """The error names the task and the field."""
@@ -134,6 +144,66 @@ def test_counts_are_whole_numbers(value):
     """True would pass for 1, and 2.0 for 2, in a comparison."""
     assert faults_of(Agent, id="a", position=HERE, bundle_limit=value) == ["bundle_limit"]
     assert faults_of(make_task, task_id="t", agents_required=value) == ["agents_required"]
+
+
+def test_seats_may_be_left_to_the_equipment_if_there_is_some():
+    """0 agents required: as many as bring the equipment; without equipment that would be nobody."""
+    task = make_task("t", equipment=frozenset({"camera", "winch"}), agents_required=0)
+    assert (task.agents_required, task.is_group) == (0, True)
+    with pytest.raises(InputError) as caught:
+        make_task("t", agents_required=0)
+    (fault,) = caught.value.faults
+    assert (fault.where, fault.field) == ("task t", "agents_required")
+    assert "needs no equipment" in fault.why
+    # What the equipment is is not known where it is faulty: one fault, not two.
+    assert faults_of(make_task, task_id="t", agents_required=0, equipment="camera") == ["equipment"]
+
+
+@pytest.mark.parametrize(("seats", "group"), [(0, True), (1, False), (2, True), (5, True)])
+def test_a_group_is_any_number_of_agents_but_one(seats, group):
+    """Of a group each may bring a part of the equipment; who is alone brings all of it."""
+    task = make_task("t", equipment=frozenset({"camera", "winch"}), agents_required=seats)
+    assert task.is_group == group
+    mission = Mission(agents=(Agent(id="a", position=HERE, equipment=frozenset({"camera"})),), tasks=(task,))
+    assert mission.can_do(mission.agents[0], task) == group
+
+
+@pytest.mark.parametrize(
+    ("needed", "sets", "count"),
+    [
+        ("", [], 0),
+        ("a", [], -1),
+        ("ab", ["a"], -1),
+        ("ab", ["a", "b"], 2),
+        ("ab", ["a", "b", "abc"], 1),
+        # The largest set first would take three: bcde, then a, then f.
+        ("abcdef", ["bcde", "abc", "def", "a", "f"], 2),
+        ("abc", ["ax", "bx", "cx", "x"], 3),
+    ],
+)
+def test_fewest_sets_that_bring_it_all(needed, sets, count):
+    assert fewest_sets(frozenset(needed), [frozenset(one) for one in sets]) == count
+
+
+names = st.frozensets(st.sampled_from("abcde"))
+
+
+@given(names, st.lists(names, max_size=5))
+def test_fewest_sets_are_those_of_trying_all(needed, sets):
+    """No choice of fewer covers, some choice of as many does."""
+    sizes = [
+        sum(1 for one in choice if one)
+        for choice in product(*[(one, frozenset()) for one in sets])
+        if needed <= frozenset().union(*choice)
+    ]
+    assert fewest_sets(needed, sets) == min(sizes, default=-1)
+
+
+def test_a_circle_is_found_among_things_of_any_kind():
+    """2 waits for 3, 3 for 4, 4 for 2; 1 only leads there, and 5 stands alone."""
+    assert find_circle({1: [2], 2: [3], 3: [4], 4: [2], 5: []}) == [2, 3, 4, 2]
+    assert find_circle({1: [2, 3], 2: [3], 3: []}) is None
+    assert find_circle({("a", "t"): [("a", "t")]}) == [("a", "t"), ("a", "t")]
 
 
 @pytest.mark.parametrize("value", [(0.0, 0.0), (0.0, 0.0, math.inf), "abc", 5, (0.0, 0.0, "z"), (0, 0, 1e13)])

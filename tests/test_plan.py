@@ -226,21 +226,25 @@ def test_no_agent_with_the_equipment():
 
 def test_too_few_agents_for_the_seats():
     found = reason_of(Task(id="t", position=at(1), agents_required=2), PLAIN)
-    assert found == ("no_capable_agent", "It needs 2 agents; only 1 may do 'task' tasks.")
+    assert found == ("too_few_agents", "It needs 2 agents; only 1 may do 'task' tasks.")
 
 
 def test_equipment_that_no_group_has():
     task = Task(id="t", position=at(1), agents_required=2, equipment=frozenset({"winch"}))
     found = reason_of(task, PLAIN, Agent(id="b", position=at(0)))
     assert found == (
-        "no_capable_agent",
+        "missing_equipment",
         "It needs winch; the agents that may do it have no winch between them.",
     )
 
 
 def test_a_task_for_several():
+    """Both have nothing to do, and each would be paid its reward of 1."""
     found = reason_of(Task(id="t", position=at(1), agents_required=2), PLAIN, Agent(id="b", position=at(0)))
-    assert found == ("needs_several_agents", "It needs 2 agents at once; cbba found no group for it.")
+    assert found == (
+        "no_group",
+        "It needs 2 agents; a (gain 1) and b (gain 1) could each join, but cbba formed no group of them.",
+    )
 
 
 def test_out_of_reach_in_time_names_the_first_who_could():
@@ -288,12 +292,18 @@ def test_a_prerequisite_that_nobody_does():
     assert found == ("prerequisite", "It comes after p, which nobody does.")
 
 
-def test_a_prerequisite_that_is_done():
+@pytest.mark.parametrize(
+    ("end", "found"),
+    [
+        (2.9, ("prerequisite", "It comes after p, done at 3 s; service must start by 2.9 s.")),
+        (3.0, ("other", "a could still take it for a gain of 1; bids never rise, gains may.")),
+    ],
+)
+def test_a_prerequisite_that_is_done(end, found):
+    """p is done at 3 s: too late for a window until 2.9 s, just in time for one until 3 s."""
     first = Task(id="p", position=at(1), duration=2.0)
-    found = reason_of(
-        Task(id="t", position=at(1), prerequisites=("p",)), PLAIN, others=(first,), paths={"a": [("p", 1.0)]}
-    )
-    assert found == ("prerequisite", "It comes after p, done at 3 s; cbba found no place for it.")
+    task = Task(id="t", position=at(1), prerequisites=("p",), end=end)
+    assert reason_of(task, PLAIN, others=(first,), paths={"a": [("p", 1.0)]}) == found
 
 
 def test_worth_nothing():
@@ -437,7 +447,7 @@ def test_a_single_seat_needs_all_the_equipment_in_one_agent():
         ),
     )
     left = explain_unserved(mission, {}, REWARD, algorithm="cbba", insertion="hold")
-    assert [item.reason for item in left] == ["no_capable_agent", "needs_several_agents"]
+    assert [item.reason for item in left] == ["no_capable_agent", "no_group"]
 
 
 @pytest.mark.parametrize("end", [math.inf, 1.0])

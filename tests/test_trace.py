@@ -30,6 +30,7 @@ from swarmbid.trace import (
     Known,
     Other,
     Outbid,
+    Quit,
     Released,
     Result,
     Sent,
@@ -59,6 +60,7 @@ RECORDS: tuple[Known, ...] = (
     Released(t=0.5, agent="a", task="v"),
     Agreed(t=0.6, agent="a"),
     Doubted(t=0.7, agent="a"),
+    Quit(t=0.7, agent="a", task="v", filled=1),
     Result(
         t=0.8,
         status="not_converged",

@@ -102,6 +102,31 @@ def mutual() -> Case:
     return mission, make_plan(mission, paths, SCORE, "hand", "hold")
 
 
+def open_seats(needs: set[str], of_b: set[str]) -> Case:
+    """t1 takes as many as bring what it needs: a with its camera, and b, both from 44 s on."""
+    mission = mission_with(
+        t1={"agents_required": 0, "equipment": frozenset(needs)},
+        a={"endurance": 100.0},
+        b={"equipment": frozenset(of_b)},
+    )
+    paths = {"a": [("t2", 20.0), ("t1", 44.0)], "b": [("t3", 5.0), ("t1", 44.0)]}
+    return mission, make_plan(mission, paths, SCORE, "hand", "hold")
+
+
+def at_once(
+    orders: dict[str, list[str]], needs: dict[str, tuple[str, ...]] | None = None, seats: int = 1
+) -> Case:
+    """All at one place and at 0 s, nothing takes time: no clock shows who waits for whom."""
+    ids = sorted({task_id for order in orders.values() for task_id in order})
+    tasks = tuple(
+        Task(id=one, position=at(0), agents_required=seats, prerequisites=(needs or {}).get(one, ()))
+        for one in ids
+    )
+    mission = Mission(agents=tuple(Agent(id=name, position=at(0)) for name in orders), tasks=tasks)
+    paths = {name: [(task_id, 0.0) for task_id in order] for name, order in orders.items()}
+    return mission, make_plan(mission, paths, SCORE, "hand", "hold")
+
+
 # rule -> a mission and a plan that breaks this rule and no other; the good mission if only a plan is given.
 CASES: dict[str, list[Callable[[], Case | Plan]]] = {
     "mission": [lambda: (mission_with(name="garden"), plan_of())],
@@ -129,6 +154,12 @@ CASES: dict[str, list[Callable[[], Case | Plan]]] = {
         lambda: (mission_with(t2={"equipment": frozenset({"winch"})}), plan_of()),
         lambda: (mission_with(a={"equipment": frozenset()}), plan_of()),
     ],
+    # Nothing needed; the camera that a brings as well; b needed beside a, but not a beside b.
+    "contribution": [
+        lambda: open_seats({"camera"}, of_b=set()),
+        lambda: open_seats({"camera"}, of_b={"camera"}),
+        lambda: open_seats({"camera", "winch"}, of_b={"camera", "winch"}),
+    ],
     # 10 m at 2 m/s take 5 s: fast enough from 0 s, but a leaves at 1 s.
     "available_at": [lambda: edit("a", 0, arrival=5.0), lambda: edit("a", 0, arrival=5.999)],
     # 4.9 s for 10 m is too fast whenever it left; t2 needs until 10 + 6 = 16 s.
@@ -150,6 +181,12 @@ CASES: dict[str, list[Callable[[], Case | Plan]]] = {
         lambda: (mission_with(t2={"prerequisites": ("t4",)}), plan_of()),
         # t1 is done at 10 s, t3 starts at 5 s.
         lambda: (mission_with(t3={"prerequisites": ("t1",)}), plan_of()),
+    ],
+    "circular_wait": [
+        # Two groups in opposite orders; one agent's order against a prerequisite; two agents' against two.
+        lambda: at_once({"a": ["s", "t"], "b": ["t", "s"]}, seats=2),
+        lambda: at_once({"a": ["s", "t"]}, {"s": ("t",)}),
+        lambda: at_once({"a": ["s", "t"], "b": ["u", "v"]}, {"s": ("v",), "u": ("t",)}),
     ],
     "visit_score": [lambda: edit("a", 0, score=49.001)],
     "agent_score": [lambda: edit("a", score=77.801)],
@@ -206,6 +243,52 @@ def test_a_group_at_one_time_with_its_equipment_together_stands():
     mission = mission_with(**(changes | {"b": {}}))
     (found,) = verify(mission, make_plan(mission, paths, SCORE, "hand", "hold"), SCORE)
     assert (found.rule, found.detail) == ("equipment", "a, b do not carry winch")
+
+
+def test_seats_left_to_the_equipment_take_who_brings_a_part():
+    """a has the camera, b the winch; with a alone the winch is missing, whatever the number of seats."""
+    assert verify(*open_seats({"camera", "winch"}, of_b={"winch"}), SCORE) == []
+    mission, _ = open_seats({"camera", "winch"}, of_b={"winch"})
+    plan = make_plan(mission, PATHS, SCORE, "hand", "hold")
+    (found,) = verify(mission, plan, SCORE)
+    assert (found.task, found.rule, found.detail) == ("t1", "equipment", "a does not carry winch")
+
+
+def test_who_brings_nothing_of_its_own_is_named():
+    (found,) = verify(*open_seats({"camera"}, of_b=set()), SCORE)
+    assert found == Violation("b", "t1", "contribution", "brings nothing needed")
+    found = verify(*open_seats({"camera"}, of_b={"camera"}), SCORE)
+    assert [(one.agent, one.detail) for one in found] == [
+        ("a", "brings camera, as others do"),
+        ("b", "brings camera, as others do"),
+    ]
+
+
+def test_seats_left_to_the_equipment_start_together():
+    mission, _ = open_seats({"camera", "winch"}, of_b={"winch"})
+    late = make_plan(mission, {"a": [("t1", 6.0)], "b": [("t3", 5.0), ("t1", 44.0)]}, SCORE, "hand", "hold")
+    assert [one.rule for one in verify(mission, late, SCORE)] == ["together"]
+
+
+def test_the_circle_is_named():
+    (found,) = verify(*at_once({"a": ["s", "t"], "b": ["t", "s"]}, seats=2), SCORE)
+    assert found.detail == "s waits for t (b does that first), t waits for s (a does that first)"
+    (found,) = verify(*at_once({"a": ["s", "t"]}, {"s": ("t",)}), SCORE)
+    assert found.detail == "s waits for t (its prerequisite), t waits for s (a does that first)"
+
+
+def test_orders_that_agree_are_no_circle():
+    """The same order for both; and agents in conflict over single seats do not wait for each other."""
+    assert verify(*at_once({"a": ["s", "t"], "b": ["s", "t"]}, seats=2), SCORE) == []
+    assert verify(*at_once({"a": ["s", "t"], "b": ["u"]}, {"t": ("u", "s")}), SCORE) == []
+    found = verify(*at_once({"a": ["s", "t"], "b": ["t", "s"]}), SCORE)
+    assert [one.rule for one in found] == ["seats_overfilled", "seats_overfilled"]
+
+
+def test_a_long_line_of_waiting_is_no_circle():
+    """20,000 visits after each other must not meet a limit of recursion."""
+    order = [f"t{row:05d}" for row in range(20_000)]
+    assert verify(*at_once({"a": order}), SCORE) == []
 
 
 def test_a_score_that_pays_for_a_conflict_is_seen():

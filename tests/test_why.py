@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import json
 from pathlib import Path
 from typing import Any
@@ -12,12 +13,14 @@ import pytest
 from generators import random_mission
 from swarmbid import unserved
 from swarmbid.errors import InputError
+from swarmbid.missionfile import mission_to_dict
 from swarmbid.model import Agent, Mission, Task
 from swarmbid.network import Network, make_topology
+from swarmbid.plan import make_plan
 from swarmbid.references.sequential_greedy import sequential_greedy
 from swarmbid.scores import make_score
 from swarmbid.simulator import simulate
-from swarmbid.trace import Released, Trace, read_trace
+from swarmbid.trace import Header, Released, Result, Taken, Trace, read_trace
 from swarmbid.why import Explanation, Step, explain
 
 CAMERA = frozenset({"camera"})
@@ -240,6 +243,45 @@ def test_what_a_task_needs_is_said_in_words(tmp_path: Path, window: dict[str, An
     assert explain(traced(tmp_path, one), "t").needs == says
 
 
+def lift(seats: int) -> Trace:
+    """p bids 8 for the lift, q 6; they do it together at 20 s. r, 40 m away at 0.1 a metre, could gain 6."""
+    here = (0.0, 0.0, 0.0)
+    mission = Mission(
+        agents=(agent("p", 0.0, 0.0), agent("q", 0.0, 20.0), agent("r", 0.0, 40.0)),
+        tasks=(
+            Task(id="dig", position=here),
+            Task(
+                id="lift", position=here, reward=10.0, agents_required=seats, equipment=CAMERA,
+                prerequisites=("dig",),
+            ),
+        ),
+    )  # fmt: skip
+    paths = {"p": [("dig", 0.0), ("lift", 20.0)], "q": [("lift", 20.0)]}
+    plan = make_plan(mission, paths, make_score("time_window"), "hand", "shift")
+    taken = [
+        Taken(t=0.0, agent=name, task="lift", bid=bid, position=0, start=20.0)
+        for name, bid in (("p", 7.0), ("q", 6.0), ("p", 8.0))
+    ]
+    header = Header(
+        swarmbid="0", mission=mission_to_dict(mission), algorithm="hand", score={"name": "time_window"}
+    )
+    return Trace("hand", header, (*taken, Result(t=1.0, status="converged", plan=plan.to_dict())))
+
+
+def test_a_group_is_named_with_its_bids():
+    """The lowest of them is what another member would have to beat."""
+    found = explain(lift(seats=2), "lift")
+    assert (found.winner, found.bid, found.start) == ("p, q", 6.0, 20.0)
+    assert found.outcome == "Done by p, q together, from 20 s; their bids of 8, 6 won."
+    assert found.needs == "type task, reward 10, needs camera, 2 agents, after dig"
+    assert others(found) == {"r": "as stop 1 it would gain 6, as much as the bid of 6"}
+    assert explain(lift(seats=0), "lift").needs.endswith("as many agents as bring that, after dig")
+
+
+def test_of_agents_that_each_mean_to_do_it_alone_one_is_named():
+    assert explain(lift(seats=1), "lift").outcome == "Done by p, from 20 s; its bid of 8 won."
+
+
 def test_the_dictionary_goes_through_json_unchanged(tmp_path: Path):
     trace = traced(tmp_path, SITE)
     for task in SITE.tasks:
@@ -360,3 +402,23 @@ def test_with_rising_gains_more_than_the_bid_that_won_has_its_reason(
         for task in mission.tasks:
             for other in explain(trace, task.id).others:
                 assert ("more than" in other.why) == ("bids never rise" in other.why), (seed, other)
+
+
+def test_it_says_that_an_incomplete_group_was_dissolved():
+    """Two agents, three seats wanted at `lift`: each that had bid on it quits, and that is told once."""
+    mission = Mission(
+        agents=tuple(Agent(id=name, position=(0.0, 0.0, 0.0)) for name in ("a", "b")),
+        tasks=(
+            Task(id="far", position=(90.0, 0.0, 0.0), reward=100.0, agents_required=2, end=1.0),
+            Task(id="lift", position=(5.0, 0.0, 0.0), reward=100.0, agents_required=2, end=4.0),
+            Task(id="pair", position=(3.0, 0.0, 0.0), reward=50.0, agents_required=2),
+        ),
+    )
+    slow = dataclasses.replace(mission.agents[0], speed=2.0)
+    trace_file = io.BytesIO()
+    mission = dataclasses.replace(mission, agents=(slow, mission.agents[1]))
+    simulate(mission, algorithm="cbga", score="distance_cost", trace=trace_file)
+    trace_file.seek(0)
+    said = str(explain(read_trace(trace_file), "lift"))
+    assert said.count("a quits: with 1 in it, its group is not complete") == 1
+    assert "gives it up" not in said

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Hashable
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,9 @@ from swarmbid.messages import StampArray as StampArray
 from swarmbid.model import Agent, Mission, Task
 
 HashArray = NDArray[np.uint64]
+RowArray = NDArray[np.int64]
+"""Rows and counts in kernels: one integer type, so that each function is compiled once."""
+Shared = TypeVar("Shared")
 
 NO_AGENT = -1
 """Row of "nobody" (the papers' empty set)."""
@@ -98,7 +101,7 @@ class MissionArrays:
         self.agent_hash = _hashes("agent", self.agent_ids)
         self.task_hash = _hashes("task", self.task_ids)
         self._physics = _physics(self.tasks)
-        self._tables: dict[Hashable, FloatArray] = {}
+        self._shared: dict[Hashable, Any] = {}
 
     @property
     def num_agents(self) -> int:
@@ -114,6 +117,29 @@ class MissionArrays:
         """Most tasks `agent` takes at once (L_t), never more than there are."""
         return self.num_tasks if agent.bundle_limit is None else min(agent.bundle_limit, self.num_tasks)
 
+    def shared(self, key: Hashable, make: Callable[[], Shared]) -> Shared:
+        """Return what `make` gives, made once for all the agents of this process."""
+        if key not in self._shared:
+            self._shared[key] = make()
+        found: Shared = self._shared[key]
+        return found
+
+    def value_table(self, owner: Hashable, fill: Callable[[FloatArray], None]) -> FloatArray:
+        """Return the task table with the value rows of a score, whoever may do what.
+
+        Parameters
+        ----------
+        owner : whose value rows these are (a score): part of the key.
+        fill : writes the value rows of a table whose physics rows are filled.
+        """
+
+        def make() -> FloatArray:
+            table = self._physics.copy()
+            fill(table)
+            return table
+
+        return self.shared(("values", owner), make)
+
     def task_table(self, agent: Agent, owner: Hashable, fill: Callable[[FloatArray], None]) -> FloatArray:
         """Return the task table for `agent`; equal agents share one.
 
@@ -121,18 +147,17 @@ class MissionArrays:
 
         Parameters
         ----------
-        owner : whose value rows these are (a score): part of the key.
-        fill : writes the value rows of a table whose physics rows are filled.
+        owner, fill : as for `value_table`.
         """
-        key = (agent.type, agent.equipment, owner)
-        if key not in self._tables:
-            table = self._physics.copy()
+
+        def make() -> FloatArray:
+            table = self.value_table(owner, fill).copy()
             for row, task in enumerate(self.tasks):
                 if not self.mission.can_do(agent, task):
                     table[END, row] = -math.inf
-            fill(table)
-            self._tables[key] = table
-        return self._tables[key]
+            return table
+
+        return self.shared((agent.type, agent.equipment, owner), make)
 
     def agent_vector(self, agent: Agent, cost_per_metre: float) -> FloatArray:
         """Return the slots above for `agent`."""

@@ -69,15 +69,17 @@ class Checker:
             return True
         return False
 
-    def count(self, name: str, mend: str) -> None:
-        """Check that a field is an int of at least 1; True is no int here."""
+    def count(self, name: str, mend: str, *, low: int = 1) -> bool:
+        """Check that a field is an int of at least `low`; True is no int here."""
         value = getattr(self.owner, name)
         if not isinstance(value, Integral) or isinstance(value, bool):
             self.fault(name, f"is {value!r}, not a whole number", mend)
-        elif value < 1:
+        elif value < low:
             self.fault(name, f"is {value}", mend)
         else:
             self.put(name, int(value))
+            return True
+        return False
 
     def position(self, name: str) -> None:
         """Check three finite numbers."""

@@ -10,6 +10,7 @@ next, so one run reports them all.
 from __future__ import annotations
 
 import gc
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import MISSING, fields
@@ -20,7 +21,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from swarmbid.errors import Fault, InputError
 from swarmbid.geodesy import FARTHEST, to_local
 from swarmbid.missiontext import MAX_JSON_BYTES, MAX_YAML_BYTES, Path, Source, read
-from swarmbid.model import Agent, Mission, Origin, Position, Task, distance, mission_findings
+from swarmbid.model import Agent, Mission, Origin, Position, Task, distance, fewest_sets, mission_findings
 
 if TYPE_CHECKING:
     from swarmbid.missionspec import GeodeticSpec, Spec
@@ -238,6 +239,8 @@ class _Reading:
                 wrong.add(detail["loc"][0] if detail["loc"] else "")
         if path[:1] == ("agents",) and wrong & {"", "type", "equipment"}:
             self.team_is_sound = False
+        if "equipment" in wrong:
+            wrong.add("agents_required")  # 0 of them is right or wrong by the equipment
         right = {key: raw[key] for key in raw if key not in wrong} if isinstance(raw, dict) else {}
         return _given(spec.model_validate(_stand_ins(path) | right))
 
@@ -255,6 +258,8 @@ class _Reading:
             steps = fault.field.split(".", 1)
             self.source.add((*path, *steps), fault.why, fault.mend)
             values.pop(steps[0], None)
+            if steps[0] == "equipment":
+                values.pop("agents_required", None)  # 0 of them is right or wrong by the equipment
             if path[:1] == ("agents",) and steps[0] in ("type", "equipment"):
                 self.team_is_sound = False
 
@@ -316,14 +321,15 @@ class _Reading:
                 guess = meant_name(name, sorted(types))
                 mend = f"Did you mean {guess!r}?" if guess else "Remove it, or add such an agent."
                 self.source.add(("compatible", name), "is the type of no agent", mend, of_key=True)
-        sets = dict.fromkeys((agent.type, agent.equipment) for agent in agents)
-        able_to: dict[str, list[frozenset[str]]] = {}
+        sets = Counter((agent.type, agent.equipment) for agent in agents)
+        able_to: dict[str, Counter[frozenset[str]]] = {}
         for index, task in enumerate(tasks):
             if task.type not in able_to:
                 anything = frozenset([task.type])
-                able_to[task.type] = [
-                    equipment for kind, equipment in sets if task.type in rules.compatible.get(kind, anything)
-                ]
+                able_to[task.type] = Counter()
+                for (kind, equipment), count in sets.items():
+                    if task.type in rules.compatible.get(kind, anything):
+                        able_to[task.type][equipment] += count
             able = able_to[task.type]
             carried = frozenset[str]().union(*able)
             path: Path = ("tasks", index)
@@ -347,11 +353,21 @@ class _Reading:
                     f"needs {', '.join(sorted(task.equipment))} together, which no single agent carries",
                     "Give them all to one agent, or raise agents_required.",
                 )
-            elif task.agents_required > len(agents):
+            elif task.agents_required > able.total():
+                team = "is 1 agent" if len(agents) == 1 else f"are {len(agents)} agents"
+                if able.total() < len(agents):
+                    team += f", of whom {able.total()} may do it"
                 self.source.add(
                     (*path, "agents_required"),
-                    f"is {task.agents_required}, but there are {len(agents)} agents",
+                    f"is {task.agents_required}, but there {team}",
                     "Add agents, or lower it.",
+                )
+            elif 1 < task.agents_required < (fewest := fewest_sets(task.equipment, able)):
+                self.source.add(
+                    (*path, "agents_required"),
+                    f"is {task.agents_required}, but to bring {', '.join(sorted(task.equipment))}"
+                    f" takes {fewest} agents",
+                    "Raise it, or 0 for as many as the equipment takes.",
                 )
 
 

@@ -97,6 +97,14 @@ class AgentSpec(Spec):
 class TaskSpec(Spec):
     """A job: where, when, what it pays and what it needs."""
 
+    # No seats by number: then the equipment says how many, so there must be some.
+    model_config = ConfigDict(
+        json_schema_extra={
+            "if": {"properties": {"agents_required": {"const": 0}}, "required": ["agents_required"]},
+            "then": {"properties": {"equipment": {"minItems": 1}}, "required": ["equipment"]},
+        }
+    )
+
     id: str = _field(..., "Its name, unique in the file", bounds=_ID)
     position: PositionSpec = _field(..., "Where it is done")
     type: str = _field("task", "Any name; see `compatible`")
@@ -105,7 +113,9 @@ class TaskSpec(Spec):
     end: Number | None = _field(None, "Service must have started by then; any time if left out", "s", _FROM_0)
     duration: Number = _field(0.0, "How long service takes", "s", _FROM_0)
     discount: Number = _field(0.0, "How fast the reward fades after start: reward·exp(-x)", "1/s", _FROM_0)
-    agents_required: int = _field(1, "How many agents do it together", bounds=_FROM_1)
+    agents_required: int = _field(
+        1, "How many agents do it together; 0 for as many as its equipment takes", bounds=_FROM_0
+    )
     equipment: list[str] = _field([], "Names of what those agents must bring between them")
     prerequisites: list[str] = _field([], "Ids of tasks that come first")
     revisit_at: Number | None = _field(None, "When a repeated visit is wanted", "s", _FROM_0)

@@ -8,8 +8,9 @@ Positions are local east-north-up; `Mission.origin` says where on Earth, if anyw
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 from swarmbid.checks import Checker
 from swarmbid.errors import Fault
@@ -18,6 +19,7 @@ ALTITUDE_REFERENCES = ("rel_home", "amsl", "terrain_agl", "wgs84_ellipsoid")
 """What an altitude is counted from: take-off point, mean sea level, ground below, WGS 84 ellipsoid."""
 
 Position = tuple[float, float, float]
+Node = TypeVar("Node", bound=Hashable)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +83,7 @@ class Task:
     start, end : s; the window bounds the START of service. Early arrivals wait.
     duration : s of service (t_j).
     discount : 1/s, how fast the reward fades after `start` (λ).
-    agents_required : seats (L_j).
+    agents_required : seats (L_j); 0 for as many as its equipment takes.
     equipment : names that the group must bring (e_j).
     prerequisites : ids of tasks that come first (P_j).
     revisit_at : s; when a repeated visit is wanted. None for an ordinary task.
@@ -120,10 +122,23 @@ class Task:
                 f"is {self.end:g} s, before start {self.start:g} s",
                 "Let the window end after it starts.",
             )
-        check.count("agents_required", "Give 1 or more.")
+        seats = check.count(
+            "agents_required", "Give 1 or more, or 0 for as many as its equipment takes.", low=0
+        )
         check.names("equipment", frozenset)
+        if seats and self.agents_required == 0 and self.equipment == frozenset():
+            check.fault(
+                "agents_required",
+                "is 0, as many agents as its equipment takes, but it needs no equipment",
+                "Name the equipment, or give 1 or more.",
+            )
         check.names("prerequisites", tuple)
         check.done()
+
+    @property
+    def is_group(self) -> bool:
+        """Whether a group does it, be it of one: its equipment may be divided among several agents."""
+        return self.agents_required != 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,11 +212,11 @@ class Mission:
         check.done()
 
     def can_do(self, agent: Agent, task: Task) -> bool:
-        """Whether `agent` may take a seat of `task`, by type and, for a single seat, equipment."""
+        """Whether `agent` may take a seat of `task`, by type and, unless a group does it, equipment."""
         allowed = self.compatible.get(agent.type)
         if allowed is not None and task.type not in allowed:
             return False
-        return task.agents_required > 1 or task.equipment <= agent.equipment
+        return task.is_group or task.equipment <= agent.equipment
 
     def distance(self, a: Position, b: Position) -> float:
         """Metres travelled from `a` to `b`, rounded down to a multiple of `distance_step`.
@@ -219,6 +234,26 @@ def distance(a: Position, b: Position) -> float:
     """Straight-line metres between two positions, the same bits on every machine."""
     dx, dy, dz = a[0] - b[0], a[1] - b[1], a[2] - b[2]
     return math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+def fewest_sets(needed: frozenset[str], sets: Iterable[frozenset[str]]) -> int:
+    """Return the least number of equipment sets, each as often as wanted, whose union holds `needed`.
+
+    -1 if even all of them together do not.
+    """
+    useful = sorted({one & needed for one in sets} - {frozenset()}, key=lambda one: (-len(one), sorted(one)))
+    # What brings no more than another is never needed.
+    useful = [one for row, one in enumerate(useful) if not any(one < other for other in useful[:row])]
+    if frozenset[str]().union(*useful) != needed:
+        return -1
+    bearers = {item: [one for one in useful if item in one] for item in needed}
+    count, missing = 0, {needed}  # what may be missing after `count` sets
+    while frozenset() not in missing:
+        # Somebody must bring the item that the fewest bring, so nothing else need be tried first.
+        rarest = {some: min(some, key=lambda item: (len(bearers[item]), item)) for some in missing}
+        missing = {some - one for some in missing for one in bearers[rarest[some]]}
+        count += 1
+    return count
 
 
 @dataclass(frozen=True)
@@ -272,22 +307,31 @@ def mission_findings(agents: Iterable[Agent], tasks: Iterable[Task]) -> list[Fin
 
 def prerequisite_cycle(tasks: tuple[Task, ...]) -> list[str] | None:
     """Return one circle of prerequisites as ids, its first repeated at the end, or None."""
-    needs = {task.id: task.prerequisites for task in tasks}
-    finished: dict[str, bool] = {}
+    return find_circle({task.id: task.prerequisites for task in tasks})
+
+
+def find_circle(needs: Mapping[Node, Sequence[Node]]) -> list[Node] | None:
+    """Return one circle of things that each wait for the next, its first repeated at the end, or None.
+
+    Parameters
+    ----------
+    needs : thing -> what it waits for.
+    """
+    finished: dict[Node, bool] = {}
     for root in needs:
         # An explicit stack: a chain of 10^5 prerequisites must not meet Python's recursion limit.
-        trail: list[str] = []
-        stack: list[tuple[str, bool]] = [(root, False)]
+        trail: list[Node] = []
+        stack: list[tuple[Node, bool]] = [(root, False)]
         while stack:
-            task_id, leaving = stack.pop()
+            node, leaving = stack.pop()
             if leaving:
-                finished[task_id] = True
+                finished[node] = True
                 trail.pop()
-            elif task_id not in finished:
-                finished[task_id] = False
-                trail.append(task_id)
-                stack.append((task_id, True))
-                stack.extend((need, False) for need in reversed(needs.get(task_id, ())))
-            elif not finished[task_id]:
-                return [*trail[trail.index(task_id) :], task_id]
+            elif node not in finished:
+                finished[node] = False
+                trail.append(node)
+                stack.append((node, True))
+                stack.extend((need, False) for need in reversed(needs.get(node, ())))
+            elif not finished[node]:
+                return [*trail[trail.index(node) :], node]
     return None

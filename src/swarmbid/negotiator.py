@@ -81,6 +81,20 @@ class TaskReleased(Event):
 
 
 @dataclass(frozen=True)
+class TaskQuit(Event):
+    """The agent gives up a task whose group stays incomplete, and bids on it no more.
+
+    Parameters
+    ----------
+    filled : how many of the task's seats were taken.
+    """
+
+    kind = "quit"
+    task: str
+    filled: int
+
+
+@dataclass(frozen=True)
 class MessageDropped(Event):
     """A message was not taken in, and changed nothing.
 
@@ -166,8 +180,11 @@ class Negotiator(ABC):
         """Hash of everything that the agents must agree on."""
 
     @abstractmethod
-    def beliefs(self) -> dict[str, tuple[str | None, float]]:
-        """Who wins which task with which bid, as far as this agent knows (z_i, y_i)."""
+    def beliefs(self) -> dict[str, tuple[tuple[str, float], ...]]:
+        """Who holds which task with which bid, as far as this agent knows (z_i, y_i; X_i).
+
+        Every task that it knows; the holders in order of id, more than one where a task needs several.
+        """
 
     # Local commands: what the vehicle and its operator tell the agent, never disguised as messages.
 

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from swarmbid.errors import Fault, InputError
 from swarmbid.model import Agent, Mission, Task
-from swarmbid.unserved import REASONS, Path, Unserved, explain_unserved, flight
+from swarmbid.timing import Path, flight
+from swarmbid.unserved import REASONS, Unserved, explain_unserved
 
 if TYPE_CHECKING:
     from swarmbid.scores import Score

@@ -78,7 +78,8 @@ def load_class(folder: str, name: str, base: type[T]) -> type[T]:
 
 def summary(folder: str, name: str) -> str:
     """Return the first line of the plug-in's docstring; one of our own is read, not imported."""
-    file = Path(importlib.import_module(f"swarmbid.{folder}").__path__[0], f"{name}.py")
+    base = Path(importlib.import_module(f"swarmbid.{folder}").__path__[0], name)
+    file = base / "__init__.py" if base.is_dir() else base.with_suffix(".py")
     text = ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) if file.is_file() else None
     if text is None:
         text = load(folder, name).__doc__

@@ -11,7 +11,7 @@ from __future__ import annotations
 import heapq
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -19,9 +19,11 @@ from typing import IO, Any
 
 from swarmbid import __version__, registry
 from swarmbid.arrays import MissionArrays
+from swarmbid.disagreement import disagreements, undisputed
 from swarmbid.errors import Fault, InputError
 from swarmbid.kernels import wire
-from swarmbid.messages import Counts, Message, decode, encode, encoded_size
+from swarmbid.messages import Beliefs, Message, decode, encode
+from swarmbid.messages.beliefs import Counts, encoded_size
 from swarmbid.missionfile import mission_to_dict
 from swarmbid.model import Mission
 from swarmbid.negotiator import Negotiator
@@ -32,7 +34,6 @@ from swarmbid.scores import INSERTIONS, Score, make_score
 from swarmbid.trace import EVENT_RECORDS, Header, Result, Sent, TraceWriter
 
 MODES = ("rounds", "asynchronous")
-MOST_DISAGREEMENTS = 100
 EPSILON = 1e-9
 """s, the least time between two ticks of an agent."""
 
@@ -49,8 +50,10 @@ class Run:
     rounds : until the beliefs of all were equal and stayed so.
     last_bid_round : of the last bid. declared_round : in which the last agent knew that all agree.
     false_agreements : instants at which all thought that all agree, and were wrong.
+    changes : how often beliefs changed; an agent's count once for each time at which it acted.
     messages, bytes, entries : broadcasts, their size on the wire, the beliefs in them.
     dropped : messages not taken in, by reason.
+    negotiators : as they were at the end, in order of id.
     """
 
     mission: Mission
@@ -69,6 +72,8 @@ class Run:
     entries: int
     dropped: dict[str, int]
     paths: dict[str, list[tuple[str, float]]] = field(repr=False)
+    changes: int = 0
+    negotiators: tuple[Negotiator, ...] = field(default=(), repr=False, compare=False)
 
     @property
     def converged(self) -> bool:
@@ -211,7 +216,8 @@ class _Run:
         self._changed_round = 0
         self._changed_at = 0.0
         self._last_bid_round = 0
-        self._messages = self._bytes = self._entries = 0
+        self._messages = self._bytes = self._entries = self._changes = 0
+        self._changed_last = [-1.0] * len(negotiators)
         self._dropped: Counter[str] = Counter()
         phases = stream(seed, "phases").random(len(negotiators)).tolist()
         first = [0.0] * len(negotiators) if mode == "rounds" else phases
@@ -251,7 +257,7 @@ class _Run:
             insertion=insertion,
             status=status,
             reason=reason,
-            disagreements=self._disagreements() if reason else [],
+            disagreements=disagreements(self.negotiators) if reason else [],
             rounds=self._changed_round,
             last_bid_round=self._last_bid_round,
             declared_round=declared,
@@ -261,6 +267,8 @@ class _Run:
             entries=self._entries,
             dropped=dict(sorted(self._dropped.items())),
             paths=self._paths(agreed=not reason),
+            changes=self._changes,
+            negotiators=tuple(self.negotiators),
         )
 
     def _instant(self) -> bool:
@@ -312,6 +320,8 @@ class _Run:
             self._digests[row] = digest
             self._changed_round = max(self._changed_round, round_)
             self._changed_at = self.now
+            self._changes += self._changed_last[row] != self.now
+            self._changed_last[row] = self.now
 
     def _note_events(self, one: Negotiator) -> None:
         for event in one.events():
@@ -331,10 +341,10 @@ class _Run:
 
     def _send(self, row: int, message: Message) -> None:
         network = self.network
-        size = encoded_size(message, counts_of(message, self.arrays))
+        size = size_on_wire(message, self.arrays)
         self._messages += 1
         self._bytes += size
-        self._entries += message.tasks.size
+        self._entries += message.entries
         if self.through_bytes:
             message = decode(encode(message))
         deliveries = network.deliveries(row, self.now)
@@ -346,7 +356,7 @@ class _Run:
                     t=self.now,
                     agent=message.sender,
                     sequence=message.sequence,
-                    entries=int(message.tasks.size),
+                    entries=message.entries,
                     bytes=size,
                     full=message.full,
                     receivers=len(network.neighbours(row, self.now)),
@@ -364,7 +374,10 @@ class _Run:
         ends += [cut.end for cut in self.network.cuts]
         ends += [end for _, end in self.network.freeze]
         wait = max((end for end in ends if math.isfinite(end)), default=0.0)
-        return math.ceil(wait + 200 + 4 * (min(self.arrays.num_tasks, seats) + 1) * hops * slow)
+        wanted = sum(task.agents_required or len(task.equipment) for task in self.arrays.tasks)
+        # Groups that stay incomplete are dissolved one after the other, each after an agreement.
+        groups = sum(task.is_group for task in self.arrays.tasks)
+        return math.ceil(wait + 200 + (4 * (min(wanted, seats) + 1) + 50 * groups) * hops * slow)
 
     def _hopeless(self) -> bool:
         """Whether the network is in pieces for good and each piece has long been at rest."""
@@ -376,26 +389,25 @@ class _Run:
         pieces = self.network.final_components(self.now)
         return f"the network is in {pieces} pieces that cannot hear each other"
 
-    def _disagreements(self) -> list[dict[str, Any]]:
-        if len(set(self._digests)) == 1:
-            return []
-        held = [(one.agent_id, one.beliefs()) for one in self.negotiators]
-        found: list[dict[str, Any]] = []
-        for task_id in self.arrays.task_ids:
-            camps: dict[str, list[str]] = {}
-            for agent_id, beliefs in held:
-                camps.setdefault(beliefs[task_id][0] or "", []).append(agent_id)
-            if len(camps) > 1 and len(found) < MOST_DISAGREEMENTS:
-                winners = [{"winner": winner or None, "agents": camps[winner]} for winner in sorted(camps)]
-                found.append({"task": task_id, "beliefs": winners})
-        return found
-
     def _paths(self, *, agreed: bool) -> dict[str, list[tuple[str, float]]]:
-        paths = {one.agent_id: one.path for one in self.negotiators}
-        return paths if agreed else _without_conflicts(paths, self.negotiators)
+        if agreed:
+            return {one.agent_id: one.path for one in self.negotiators}
+        return undisputed(self.mission, self.negotiators)
 
 
-def counts_of(message: Message, arrays: MissionArrays) -> Counts:
+def size_on_wire(message: Message, arrays: MissionArrays) -> int:
+    """Bytes of a message that is in the rows of `arrays`.
+
+    Beliefs are counted without being encoded: in large runs there are a million of them.
+    """
+    return (
+        encoded_size(message, counts_of(message, arrays))
+        if isinstance(message, Beliefs)
+        else len(encode(message))
+    )
+
+
+def counts_of(message: Beliefs, arrays: MissionArrays) -> Counts:
     """Count what the size of a message follows from; the message is in the rows of `arrays`."""
     agents, agent_bytes, task_bytes, winners = wire.count_columns(
         message.heard, message.tasks, message.winners, message.agreed, message.asked, message.left,
@@ -410,18 +422,3 @@ def counts_of(message: Message, arrays: MissionArrays) -> Counts:
         agreed_at=wire.spread(message.agreed_at),
         left_at=wire.spread(message.left_at),
     )
-
-
-def _without_conflicts(
-    paths: Mapping[str, list[tuple[str, float]]], negotiators: list[Negotiator]
-) -> dict[str, list[tuple[str, float]]]:
-    """Leave each task to the best of the agents that plan it, so that no task is counted twice."""
-    best: dict[str, tuple[float, str]] = {}
-    for one in negotiators:
-        beliefs = one.beliefs()
-        for task_id, _ in paths[one.agent_id]:
-            best[task_id] = max(best.get(task_id, (-math.inf, "")), (beliefs[task_id][1], one.agent_id))
-    return {
-        agent_id: [(task_id, start) for task_id, start in path if best[task_id][1] == agent_id]
-        for agent_id, path in paths.items()
-    }

@@ -11,13 +11,17 @@ import math
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from swarmbid.model import Agent, Mission, Task
+from swarmbid.model import Agent, Mission, Task, find_circle
 from swarmbid.plan import AgentPlan, Plan, Visit
 
 if TYPE_CHECKING:
     from swarmbid.scores import Score
+
+_Step = tuple[str, str]
+"""What starts at one time: the agent ("" for a group) and the task."""
 
 TOLERANCE = 1e-9
 """Relative difference (absolute below 1) that is put down to rounding."""
@@ -35,6 +39,7 @@ RULES = {
     "together": "agents on one task start it at the same time",
     "type": "an agent does only what its type may do",
     "equipment": "the agents on a task carry what it needs",
+    "contribution": "where equipment decides how many, each agent brings something that no other brings",
     "available_at": "an agent leaves no sooner than it is available",
     "speed": "an agent arrives no sooner than its speed allows",
     "early_start": "service starts no sooner than the agent arrives",
@@ -47,6 +52,7 @@ RULES = {
     "endurance": "an agent is done within its endurance, the way back included",
     "bundle_limit": "an agent has no more tasks than its bundle limit",
     "prerequisites": "what must come first is finished first",
+    "circular_wait": "agents do not wait for each other in a circle",
     "visit_score": "a visit is worth what the score says",
     "agent_score": "an agent's score is the sum over its visits",
     "total_score": "the total score is the sum over the agents",
@@ -127,6 +133,7 @@ class _Verifier:
         for task in self.mission.tasks:
             if task.id in self.crews:
                 yield from self.crew(task, self.crews[task.id])
+        yield from self.circles()
         yield from self.books()
 
     def roster(self) -> Iterator[Violation]:
@@ -202,18 +209,55 @@ class _Verifier:
         """Judge the agents on one task as a group."""
         names = sorted({agent.id for agent, _ in crew})
         who = f"has {len(names)} of {task.agents_required} agents: {', '.join(names)}"
-        if len(names) > task.agents_required:
+        if task.agents_required == 0:
+            yield from self.contributions(task, {agent.id: agent for agent, _ in crew})
+        elif len(names) > task.agents_required:
             yield Violation(None, task.id, "seats_overfilled", who)
-        if len(names) < task.agents_required:
+        elif len(names) < task.agents_required:
             yield Violation(None, task.id, "seats_underfilled", who)
         missing = task.equipment.difference(*(agent.equipment for agent, _ in crew))
         if missing:
-            yield Violation(
-                None, task.id, "equipment", f"{', '.join(names)} do not carry {', '.join(sorted(missing))}"
-            )
+            verb = "does not carry" if len(names) == 1 else "do not carry"
+            detail = f"{', '.join(names)} {verb} {', '.join(sorted(missing))}"
+            yield Violation(None, task.id, "equipment", detail)
         starts = [visit.start for _, visit in crew]
-        if task.agents_required > 1 and _more(max(starts), min(starts)):
+        if task.is_group and _more(max(starts), min(starts)):
             yield Violation(None, task.id, "together", f"starts at {sorted(starts)} s, must be at once")
+
+    def contributions(self, task: Task, crew: dict[str, Agent]) -> Iterator[Violation]:
+        """Find agents without whom the others would bring as much."""
+        bearers = Counter(item for agent in crew.values() for item in agent.equipment)
+        for name, agent in sorted(crew.items()):
+            brought = sorted(task.equipment & agent.equipment)
+            if all(bearers[item] > 1 for item in brought):
+                detail = f"brings {', '.join(brought)}, as others do" if brought else "brings nothing needed"
+                yield Violation(name, task.id, "contribution", detail)
+
+    def circles(self) -> Iterator[Violation]:
+        """Find agents that wait for each other: no start time helps, not even where nothing takes time."""
+        # A group starts as one; agents in conflict over a single seat do not wait for each other.
+        waits: dict[_Step, list[_Step]] = {}
+        why: dict[tuple[_Step, _Step], str] = {}
+        doings: dict[str, list[_Step]] = defaultdict(list)
+        for one in self.plan.agents:
+            before: _Step | None = None
+            for task_id in dict.fromkeys(visit.task for visit in one.visits if visit.task in self.tasks):
+                step = ("" if self.tasks[task_id].is_group else one.agent, task_id)
+                if step not in waits:
+                    waits[step] = []
+                    doings[task_id].append(step)
+                if before is not None:
+                    waits[step].append(before)
+                    why.setdefault((step, before), f"{one.agent} does that first")
+                before = step
+        for step, firsts in waits.items():
+            for need in self.tasks[step[1]].prerequisites:
+                firsts += doings[need]
+                why |= {(step, first): "its prerequisite" for first in doings[need]}
+        circle = find_circle(waits)
+        if circle is not None:
+            parts = [f"{a[1]} waits for {b[1]} ({why[a, b]})" for a, b in pairwise(circle)]
+            yield Violation(None, circle[0][1], "circular_wait", ", ".join(parts))
 
     def worths(self, agent: Agent, one: AgentPlan, score: Score) -> list[float]:
         """What each visit is worth by the score's own definition; nothing for an unknown task."""

@@ -14,7 +14,7 @@ from swarmbid.errors import Fault, InputError, did_you_mean
 from swarmbid.model import Mission, Task
 from swarmbid.plan import Plan
 from swarmbid.scores import Score, make_score
-from swarmbid.trace import Outbid, Released, Taken, Trace
+from swarmbid.trace import Outbid, Quit, Released, Taken, Trace
 from swarmbid.unserved import offers
 
 
@@ -55,8 +55,9 @@ class Explanation:
 
     Parameters
     ----------
-    task : its id. needs : what it asks for, in words. winner : the agent's id; None if nobody does it.
-    bid : the winning bid, score units. start : s, planned. outcome : a sentence.
+    task : its id. needs : what it asks for, in words.
+    winner : the agent's id, or its group's, joined by ", "; None if nobody does it.
+    bid : the winning bid, the lowest of a group, score units. start : s, planned. outcome : a sentence.
     history : in order of time. others : in order of id. in_rounds : whether the run counted rounds.
     """
 
@@ -115,15 +116,16 @@ def explain(trace: Trace, task_id: str, *, score: str | Score | None = None) -> 
     plan = Plan.from_dict(trace.finished().plan, where=trace.source)
     history = _history(trace, task_id)
     bids = _best_bids(trace, task_id)
-    winner, start = _doer(plan, task_id)
-    bid = _last_bid(trace, task_id, winner)
+    doers, start = _doers(plan, task)
+    won = {doer: _last_bid(trace, task_id, doer) for doer in doers}
+    bid = min((one for one in won.values() if one is not None), default=None)
     return Explanation(
         task=task_id,
         needs=_needs(task),
-        winner=winner,
+        winner=", ".join(doers) or None,
         bid=bid,
         start=start,
-        outcome=_outcome(plan, task_id, winner, bid, start) + _doubt(trace),
+        outcome=_outcome(plan, task_id, won, start) + _doubt(trace),
         history=history,
         others=_others(mission, plan, trace, task, bids, bid, _score(trace, score)),
         in_rounds=trace.header.mode == "rounds",
@@ -139,11 +141,18 @@ def _needs(task: Task) -> str:
         parts.append(f"{task.duration:g} s of service")
     if task.equipment:
         parts.append("needs " + ", ".join(sorted(task.equipment)))
+    if task.is_group:
+        parts.append(
+            f"{task.agents_required} agents" if task.agents_required else "as many agents as bring that"
+        )
+    if task.prerequisites:
+        parts.append("after " + ", ".join(task.prerequisites))
     return ", ".join(parts)
 
 
 def _history(trace: Trace, task_id: str) -> tuple[Step, ...]:
     steps = []
+    quit_at = (-1.0, "")
     for record in trace.records:
         if isinstance(record, Taken) and record.task == task_id:
             steps.append(
@@ -152,7 +161,11 @@ def _history(trace: Trace, task_id: str) -> tuple[Step, ...]:
         elif isinstance(record, Outbid) and record.task == task_id:
             by = f"by {record.by} with {record.by_bid:.6g}"
             steps.append(Step(record.t, record.agent, f"is outbid {by} (had bid {record.bid:.6g})"))
-        elif isinstance(record, Released) and record.task == task_id:
+        elif isinstance(record, Quit) and record.task == task_id:
+            what = f"quits: with {record.filled} in it, its group is not complete"
+            steps.append(Step(record.t, record.agent, what))
+            quit_at = (record.t, record.agent)
+        elif isinstance(record, Released) and record.task == task_id and (record.t, record.agent) != quit_at:
             because = f", having lost {record.because}" if record.because else " for a better bundle"
             steps.append(Step(record.t, record.agent, f"gives it up{because}"))
     return tuple(steps)
@@ -166,23 +179,27 @@ def _best_bids(trace: Trace, task_id: str) -> dict[str, float]:
     return best
 
 
-def _last_bid(trace: Trace, task_id: str, winner: str | None) -> float | None:
-    bids = [record.bid for record in trace.of(Taken) if record.task == task_id and record.agent == winner]
+def _last_bid(trace: Trace, task_id: str, doer: str) -> float | None:
+    bids = [record.bid for record in trace.of(Taken) if record.task == task_id and record.agent == doer]
     return bids[-1] if bids else None
 
 
-def _doer(plan: Plan, task_id: str) -> tuple[str | None, float | None]:
-    for one in plan.agents:
-        for visit in one.visits:
-            if visit.task == task_id:
-                return one.agent, visit.start
-    return None, None
+def _doers(plan: Plan, task: Task) -> tuple[list[str], float | None]:
+    """Who does the task, in order of id, and from when on, s."""
+    found = {one.agent: visit.start for one in plan.agents for visit in one.visits if visit.task == task.id}
+    # Agents that did not agree may each mean to do it; one of them will.
+    names = list(found) if task.is_group else list(found)[:1]
+    return names, max((found[name] for name in names), default=None)
 
 
-def _outcome(plan: Plan, task_id: str, winner: str | None, bid: float | None, start: float | None) -> str:
-    if winner is not None and start is not None:
-        won = "" if bid is None else f"; its bid of {bid:.6g} won"
-        return f"Done by {winner}, from {start:.6g} s{won}."
+def _outcome(plan: Plan, task_id: str, won: dict[str, float | None], start: float | None) -> str:
+    bids = [f"{bid:.6g}" for bid in won.values() if bid is not None]
+    if len(won) == 1 and start is not None:
+        because = f"; its bid of {bids[0]} won" if bids else ""
+        return f"Done by {next(iter(won))}, from {start:.6g} s{because}."
+    if won and start is not None:
+        because = f"; their bids of {', '.join(bids)} won" if bids else ""
+        return f"Done by {', '.join(won)} together, from {start:.6g} s{because}."
     for left in plan.unserved:
         if left.task == task_id:
             return f"Done by nobody ({left.reason}). {left.detail}"

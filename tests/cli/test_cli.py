@@ -108,7 +108,7 @@ WRONG = {
     "plan QUICK -o a.json --report a.json": "a.json: is named for two outputs.",
     "plan QUICK -o QUICK": "quickstart.yaml: is the input. Give the output a file of its own.",
     "simulate QUICK --trace QUICK": "quickstart.yaml: is the input.",
-    "plan QUICK -s nothing": "there is no score 'nothing'. Choose one of: distance_cost, revisit,",
+    "plan QUICK -s nothing": "there is no score 'nothing'. Choose one of: distance_cost, early_finish,",
     "plan QUICK -s none.py": "none.py: cannot be read: No such file or directory. Name a readable file.",
     "plan QUICK -a cbbaa": "there is no algorithm 'cbbaa'. Did you mean 'cbba'?",
     "plan QUICK --insertion push": "insertion: is 'push'. Choose one of: hold, shift, append.",
@@ -127,7 +127,7 @@ WRONG = {
     "simulate QUICK --partition 1:3:scuot": "there is no agent 'scuot'. Did you mean 'scout'?",
     "why nofile x": "nofile: cannot be read: No such file or directory.",
     "why QUICK x": "is no swarmbid trace: its first line is no JSON object",
-    "bench nothing": "there is no experiment 'nothing'. Choose one of: toptw.",
+    "bench nothing": "there is no experiment 'nothing'. Choose one of: dcmrta,",
 }
 
 

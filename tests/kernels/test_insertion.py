@@ -58,7 +58,8 @@ class KernelView:
         self.gain, self.position, self.start = np.zeros(count), np.zeros(count, np.int64), np.zeros(count)
         insertion.evaluate(
             table, np.arange(count), count, vector, rows, length, self.starts, self.legs, self.values,
-            self.flown, RULES[rule], self.gain, self.position, self.start,
+            self.flown, RULES[rule], insertion.first_position(RULES[rule], length), length,
+            self.gain, self.position, self.start,
         )  # fmt: skip
         fixed = score.fixed(arrays, agent)
         if fixed is not None:

@@ -9,7 +9,8 @@ from generators import random_mission
 from swarmbid.arrays import NO_AGENT, MissionArrays
 from swarmbid.kernels import wire
 from swarmbid.kernels.consensus import NOT_LISTED, TO_SEND, TO_WEIGH
-from swarmbid.messages import Beliefs, decode, encode, encoded_size
+from swarmbid.messages import Beliefs, decode, encode
+from swarmbid.messages.beliefs import encoded_size
 from swarmbid.simulator import counts_of
 
 

@@ -50,7 +50,7 @@ def assert_sound(fleet: Fleet) -> None:
     first = next(iter(fleet.agents.values())).beliefs()
     for agent_id, agent in fleet.agents.items():
         assert agent.beliefs() == first
-        assert sorted(agent.bundle) == sorted(t for t, (winner, _) in first.items() if winner == agent_id)
+        assert sorted(agent.bundle) == sorted(t for t, held in first.items() if agent_id in dict(held))
         assert sorted(task_id for task_id, _ in agent.path) == sorted(agent.bundle)
 
 

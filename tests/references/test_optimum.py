@@ -249,6 +249,7 @@ def test_coupled_tasks_are_refused_each_by_name():
         tasks=(
             Task(id="t1", position=at(1), agents_required=2),
             Task(id="t2", position=at(2), prerequisites=("t1",)),
+            Task(id="t3", position=at(3), agents_required=0, equipment=frozenset({"winch"})),
         ),
     )
     with pytest.raises(InputError) as caught:
@@ -256,4 +257,5 @@ def test_coupled_tasks_are_refused_each_by_name():
     assert [(fault.where, fault.field) for fault in caught.value.faults] == [
         ("task t1", "agents_required"),
         ("task t2", "prerequisites"),
+        ("task t3", "agents_required"),
     ]

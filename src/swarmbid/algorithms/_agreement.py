@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmbid.arrays import IntArray, StampArray
-from swarmbid.messages import NOT_LISTED, Beliefs
+from swarmbid.messages import NOT_LISTED, Message
 
 
 class Agreement:
@@ -31,7 +31,7 @@ class Agreement:
         self._waited_for[me] = False
         self._doubtful = me  # somebody who lately held another digest: looked at first
 
-    def hear(self, sender: int, message: Beliefs) -> None:
+    def hear(self, sender: int, message: Message) -> None:
         """Take in what a message says of digests. The message is in the agent's own rows."""
         if message.digest_at > self._at[sender]:
             self._digest[sender] = message.digest

@@ -1,13 +1,12 @@
 """What CBAA and CBBA share: two phases, one conversation.
 
 An algorithm of this family is a decision table, a bundle limit and a rule for what stays of the old
-bundle. Everything else stands here: taking in messages, building, speaking, agreement, local commands.
+bundle. Everything else stands here: what a message changes, building, what is said, local commands.
 
-How an agent speaks. At most once a `period`, it broadcasts the beliefs that changed since its last
-message, and those on which a neighbour was heard to differ. Messages of one sender build on each other;
-who misses one notices at the next, drops it (its stamps are newer than what it leaves out) and asks for
-the full state, which is also sent every `full_every` messages. An agent speaks on, and its stamp
-advances, until it has seen every live agent hold its digest; then it is silent but for a heartbeat.
+What an agent says: the beliefs that changed since its last message, and those on which a neighbour was
+heard to differ. Messages of one sender build on each other; who misses one notices at the next, drops it
+(its stamps are newer than what it leaves out) and asks for the full state, which is also sent every
+`full_every` messages.
 """
 
 from __future__ import annotations
@@ -18,33 +17,24 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from swarmbid.algorithms._agreement import Agreement
 from swarmbid.algorithms._beliefs import DONE_BID, BeliefTable, translated
-from swarmbid.algorithms._bundle import RULES, Bundle
-from swarmbid.algorithms._voice import FULL_AFTER_ASKED, Voice
-from swarmbid.arrays import NO_AGENT, MissionArrays, StampArray
-from swarmbid.errors import Fault, InputError
+from swarmbid.algorithms._bundle import Bundle
+from swarmbid.algorithms._conversation import Conversation, check_options
+from swarmbid.algorithms._voice import FULL_AFTER_ASKED, BeliefsVoice
+from swarmbid.arrays import NO_AGENT, MissionArrays
+from swarmbid.errors import Fault
 from swarmbid.kernels.bundle import BID, PATH, START
 from swarmbid.kernels.consensus import TO_SEND, TO_WEIGH
-from swarmbid.messages import INCARNATION, Beliefs, Message, MessageError
+from swarmbid.messages import Beliefs, Message, MessageError
 from swarmbid.model import Mission, Position, Task
-from swarmbid.negotiator import (
-    Agreed,
-    Doubted,
-    Event,
-    MessageDropped,
-    Negotiator,
-    TaskOutbid,
-    TaskReleased,
-    TaskTaken,
-)
+from swarmbid.negotiator import TaskOutbid, TaskReleased, TaskTaken
 from swarmbid.scores import Score, make_score
 
 STARTED_BID = DONE_BID / 2.0
 """Bid on a task that has been started: nobody outbids it, but it is open again if its agent is lost."""
 
 
-class ConsensusAuction(Negotiator):
+class ConsensusAuction(Conversation[BeliefsVoice]):
     """An auction in two phases: bid on what pays, agree with the neighbours on who won.
 
     Parameters
@@ -83,16 +73,18 @@ class ConsensusAuction(Negotiator):
         idle_every: int = 4,
         incarnation: int = 1,
     ) -> None:
-        arrays = mission if isinstance(mission, MissionArrays) else MissionArrays(mission)
-        self.agent_id = agent_id
-        self.period = period
-        self.heartbeat = heartbeat
-        self.idle_every = idle_every
+        faults = []
+        if stamps not in ("originator", "reception"):
+            mend = "Give 'originator' or 'reception'."
+            faults.append(Fault(f"agent {agent_id}", "stamps", f"is {stamps!r}", mend))
+        arrays = check_options(
+            agent_id, mission, insertion, period=period, heartbeat=heartbeat, faults=faults,
+            full_every=full_every, idle_every=idle_every,
+        )  # fmt: skip
+        voice = BeliefsVoice(agent_id, arrays.num_agents, incarnation=incarnation, full_every=full_every)
+        super().__init__(agent_id, arrays, voice, period=period, heartbeat=heartbeat, idle_every=idle_every)
         self._rebuild = rebuild
         self._reception = stamps == "reception"
-        self._check(arrays, insertion, stamps, full_every)
-        self._arrays = arrays
-        self._me = arrays.agent_row[agent_id]
         found = make_score(score)
         agent = arrays.agents[self._me]
         self._bundle = Bundle(
@@ -100,32 +92,7 @@ class ConsensusAuction(Negotiator):
             limit=self._limit(arrays.bundle_limit(agent)), insertion=insertion or found.insertion, warp=warp,
         )  # fmt: skip
         self._beliefs = BeliefTable(arrays, self._me)
-        self._agreement = Agreement(arrays.num_agents, self._me)
-        self._received: StampArray = np.zeros(arrays.num_agents, np.int64)
-        self._voice = Voice(agent_id, arrays.num_agents, incarnation=incarnation, full_every=full_every)
         self._started: list[tuple[int, float]] = []
-        self._left: dict[int, int] = {}
-        self._agreed = False
-        self._must_build = True
-        self._events: list[Event] = []
-        self._due = -np.inf
-        self._busy = True
-
-    def _check(self, arrays: MissionArrays, insertion: str | None, stamps: str, full_every: int) -> None:
-        where = f"agent {self.agent_id}"
-        faults = []
-        if self.agent_id not in arrays.agent_row:
-            faults.append(Fault(where, "id", "is not in the mission", "Name one of its agents."))
-        if insertion is not None and insertion not in RULES:
-            mend = "Choose one of: " + ", ".join(RULES) + "."
-            faults.append(Fault(where, "insertion", f"is {insertion!r}", mend))
-        if stamps not in ("originator", "reception"):
-            faults.append(Fault(where, "stamps", f"is {stamps!r}", "Give 'originator' or 'reception'."))
-        if min(full_every, self.idle_every) < 1 or not self.period > 0.0 or not self.heartbeat >= self.period:
-            mend = "Give full_every and idle_every of 1 or more, a period above 0 s, a heartbeat no shorter."
-            faults.append(Fault(where, "period, heartbeat, full_every, idle_every", "do not fit", mend))
-        if faults:
-            raise InputError(faults)
 
     def _limit(self, limit: int) -> int:
         """Most tasks at once."""
@@ -138,104 +105,43 @@ class ConsensusAuction(Negotiator):
         still = self._beliefs.winner[self._bundle.tasks] == self._me
         return int(np.argmin(still)) if not still.all() else self._bundle.length
 
-    # --- the door in
+    # --- the conversation
 
-    def receive(self, message: Message, now: float) -> None:
-        """Take in one message; see `Negotiator.receive`."""
-        reason = self._take_in(message, now)
-        if reason is not None:
-            self._events.append(MessageDropped(str(getattr(message, "sender", "?")), reason))
-
-    def _take_in(self, message: Message, now: float) -> str | None:
-        """Return why the message was dropped, or None."""
+    def _understand(self, message: Message) -> Message:
         if not isinstance(message, Beliefs):
-            return "malformed"
-        sender = self._arrays.agent_row.get(message.sender)
-        if sender is None:
-            return "unknown_sender"
-        if sender == self._me:
-            return "own"
-        last = int(self._received[sender])
-        if message.sequence <= last:
-            return "stale"
-        if message.sequence <= self._left.get(sender, 0):
-            return "gone"
-        try:
-            message = translated(message, self._arrays)
-        except MessageError as error:
-            return error.reason
-        self._busy = True
-        # What is said of digests stands on its own, so it counts even where the beliefs cannot.
-        self._agreement.hear(sender, message)
+            raise MessageError("malformed", "is of another algorithm")
+        return translated(message, self._arrays)
+
+    def _missed(self, sender: int, message: Message) -> str | None:
+        assert isinstance(message, Beliefs)
         if message.asked.size and self._me in message.asked:
             self._voice.repeat(FULL_AFTER_ASKED)
-        if message.since > last:
+        if message.since > self._received[sender]:
             self._voice.asked.add(sender)
             return "gap"
-        self._received[sender] = message.sequence
         self._voice.asked.discard(sender)
+        return None
+
+    def _absorb(self, sender: int, message: Message, now: float) -> None:
+        assert isinstance(message, Beliefs)
         heard = message.heard
         if self._reception:
             heard = heard.copy()
             heard[sender] = round(now * 1e6) + 1  # whole microseconds; 0 would be "nothing heard"
-        if message.left.size:
-            for row, stamp in zip(message.left.tolist(), message.left_at.tolist(), strict=True):
-                self._note_left(row, stamp)
         self._beliefs.resolve(self.DECISIONS, sender, message, heard)
-        if self._left:
-            self._open_what_is_left()
-        if self._agreed and not message.settled and now - self._voice.last_spoken >= 2.0 * self.period:
-            # Somebody still doubts though we have long been silent: a word of ours was lost.
-            self._voice.repeat()
-        return None
 
-    # --- the door out
-
-    def next_tick(self) -> float | None:
-        """When there is something to weigh or to say; see `Negotiator.next_tick`."""
-        if self._busy:
-            return float(self._due)
-        if self._leaving:
-            return None
-        return float(self._voice.last_spoken + self.heartbeat)
-
-    def tick(self, now: float) -> list[Message]:
-        """Build if bids changed, then speak if there is something to say; see `Negotiator.tick`."""
-        if now < self._due:
-            return []
-        self._due = now + self.period
-        pending = self._beliefs.pending
-        if not self._leaving and (self._must_build or pending & TO_WEIGH):
+    def _decide(self, now: float) -> None:
+        if self._must_build or self._beliefs.pending & TO_WEIGH:
             self._build()
-            pending = self._beliefs.pending
-        digest = self._beliefs.digest
-        agreed = self._agreement.reached(digest)
-        if agreed != self._agreed:
-            self._agreed = agreed
-            self._events.append(Agreed() if agreed else Doubted())
-        voice = self._voice
-        silent_for = now - voice.last_spoken
-        heartbeat = silent_for >= self.heartbeat
-        speak = (
-            heartbeat
-            or (not agreed and silent_for >= self.idle_every * self.period)
-            or voice.has_news(digest)
-            or self._agreement.has_news(digest)
-            or bool(pending & TO_SEND)
-        )
-        if self._leaving:
-            speak = voice.full_for > 0  # a last word, a few times over; then silence
-        self._busy = voice.full_for > 1 or not (agreed or self._leaving)
-        if not speak:
-            if not self._busy:
-                self._due = -np.inf
-            return []
-        return [
-            voice.say(
-                now, self._beliefs, self._agreement, self._left,
-                own_stamps=not self._reception, settled=agreed, heartbeat=heartbeat,
-            )
-        ]  # fmt: skip
+
+    def _news(self) -> bool:
+        return bool(self._beliefs.pending & TO_SEND)
+
+    def _say(self, now: float, *, heartbeat: bool) -> Message:
+        return self._voice.say(
+            now, self._beliefs, self._agreement, self._left,
+            own_stamps=not self._reception, settled=self._agreed, heartbeat=heartbeat,
+        )  # fmt: skip
 
     def _build(self) -> None:
         """Phase 1, and what it changes in the beliefs."""
@@ -280,11 +186,6 @@ class ConsensusAuction(Negotiator):
 
     # --- what the driver may ask
 
-    def events(self) -> list[Event]:
-        """Drain the events; see `Negotiator.events`."""
-        drained, self._events = self._events, []
-        return drained
-
     @property
     def path(self) -> list[tuple[str, float]]:
         """Started tasks first, then the path (p_i, τ_i)."""
@@ -297,16 +198,11 @@ class ConsensusAuction(Negotiator):
         return [self._arrays.task_ids[row] for row in self._bundle.tasks.tolist()]
 
     @property
-    def agreed(self) -> bool:
-        """See `Negotiator.agreed`; as of the last tick."""
-        return self._agreed
-
-    @property
     def digest(self) -> int:
         """See `Negotiator.digest`."""
         return self._beliefs.digest
 
-    def beliefs(self) -> dict[str, tuple[str | None, float]]:
+    def beliefs(self) -> dict[str, tuple[tuple[str, float], ...]]:
         """See `Negotiator.beliefs`."""
         return self._beliefs.as_dict()
 
@@ -370,56 +266,17 @@ class ConsensusAuction(Negotiator):
         for row, _ in self._started:
             self._beliefs.set(row, self._me, DONE_BID)
         self._bundle.drop_all()
-        self._left[self._me] = _last_stamp(self._voice.stamp)
-        self._voice.repeat(FULL_AFTER_ASKED)
-        self._change()
+        self._leave()
 
-    def lose_agent(self, agent_id: str) -> None:
-        """See `Negotiator.lose_agent`. It counts as gone until it speaks as a new incarnation."""
-        if agent_id not in self._arrays.agent_row:
-            raise ValueError(f"agent {agent_id} is not in the mission")
-        row = self._arrays.agent_row[agent_id]
-        self._note_left(row, _last_stamp(max(self._newest(row), INCARNATION)))
-        self._open_what_is_left()
-
-    def _note_left(self, row: int, stamp: int) -> None:
-        """An agent is gone, with all that it said up to `stamp`."""
-        if row == self._me:
-            if stamp >= self._voice.stamp and not self._leaving:
-                # Somebody gave us up, but we are here: speak on as a new incarnation.
-                self._voice.reincarnate(stamp)
-        elif stamp > self._left.get(row, 0):
-            self._left[row] = stamp
-            self._voice.repeat()
-        self._busy = True
+    # --- who has left
 
     def _open_what_is_left(self) -> None:
-        """What agents that are gone had won is open again, whoever still says otherwise."""
-        for row, stamp in self._left.items():
-            gone = self._newest(row) <= stamp
+        for row in self._left:
+            gone = self._gone(row)
             self._agreement.wait_for(row, not gone)
             if gone and row != self._me:
                 self._beliefs.open_all_of(row)
 
     def _newest(self, row: int) -> int:
-        """The newest stamp that an agent is known to have given itself."""
-        newest = max(int(self._received[row]), self._agreement.newest(row))
+        newest = super()._newest(row)
         return newest if self._reception else max(newest, int(self._beliefs.heard[row]))
-
-    @property
-    def _leaving(self) -> bool:
-        return self._me in self._left
-
-    def _row(self, task_id: str) -> int:
-        if task_id not in self._arrays.task_row:
-            raise ValueError(f"task {task_id} is not known to {self.agent_id}; call add_task first")
-        return self._arrays.task_row[task_id]
-
-    def _change(self) -> None:
-        self._must_build = True
-        self._busy = True
-
-
-def _last_stamp(stamp: int) -> int:
-    """The last stamp of the incarnation that `stamp` belongs to."""
-    return (stamp // INCARNATION + 1) * INCARNATION - 1

@@ -92,11 +92,11 @@ class BeliefTable:
         for row in rows.tolist():
             self.set(row, NO_AGENT, 0.0)
 
-    def as_dict(self) -> dict[str, tuple[str | None, float]]:
-        """Task id -> (winner's id or None, winning bid)."""
+    def as_dict(self) -> dict[str, tuple[tuple[str, float], ...]]:
+        """Task id -> (winner's id, winning bid), or nothing."""
         ids = self.arrays.agent_ids
         return {
-            task_id: (None if winner == NO_AGENT else ids[winner], bid)
+            task_id: () if winner == NO_AGENT else ((ids[winner], bid),)
             for task_id, winner, bid in zip(
                 self.arrays.task_ids, self.winner.tolist(), self.bid.tolist(), strict=True
             )

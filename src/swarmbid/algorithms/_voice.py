@@ -18,38 +18,31 @@ NO_STAMPS: StampArray = np.zeros(0, np.int64)
 
 
 class Voice:
-    """Makes an agent's messages, each built on the last or holding the full state.
+    """What every kind of message needs: stamps, when to repeat, and since when the digest holds.
 
     Parameters
     ----------
-    agent_id : the sender. num_agents : of the roster.
+    agent_id : the sender.
     incarnation : of the sender; its stamps begin with it.
-    full_every : messages between two full states.
 
     Attributes
     ----------
-    stamp : of the last message, and of all that the agent believes of itself.
-    asked : rows of agents whose full state is wanted, because a message of theirs was missed.
+    stamp : of the last message.
     full_for : full states still to be sent.
     last_spoken : s.
     """
 
-    def __init__(self, agent_id: str, num_agents: int, *, incarnation: int, full_every: int) -> None:
+    def __init__(self, agent_id: str, *, incarnation: int) -> None:
         self.agent_id = agent_id
-        self.full_every = full_every
         self.stamp = incarnation * INCARNATION
-        self.asked: set[int] = set()
         self.full_for = 0
         self.last_spoken = -math.inf
-        self._previous = 0
-        self._since_full = 0
-        self._told_heard: StampArray = np.full(num_agents, NOT_LISTED, np.int64)
         self._told_digest = -1
         self._digest_at = 0
 
     def has_news(self, digest: int) -> bool:
-        """Whether something is wanted or untold, changed beliefs aside."""
-        return self.full_for > 0 or bool(self.asked) or digest != self._told_digest
+        """Whether something is wanted or untold, the content aside."""
+        return self.full_for > 0 or digest != self._told_digest
 
     def repeat(self, times: int = 1) -> None:
         """Send the full state in the next messages."""
@@ -59,6 +52,42 @@ class Voice:
         """Speak on with stamps above `after`."""
         self.stamp = after + 1
         self.repeat()
+
+    def next_stamp(self, now: float, digest: int) -> tuple[int, int]:
+        """Count the next message; return its stamp, and the stamp since when `digest` holds."""
+        self.stamp += 1
+        self.last_spoken = now
+        self.full_for = max(self.full_for - 1, 0)
+        if digest != self._told_digest:
+            self._told_digest = digest
+            self._digest_at = self.stamp
+        return self.stamp, self._digest_at
+
+
+class BeliefsVoice(Voice):
+    """Makes messages of beliefs, each built on the last or holding the full state.
+
+    Parameters
+    ----------
+    num_agents : of the roster.
+    full_every : messages between two full states.
+
+    Attributes
+    ----------
+    asked : rows of agents whose full state is wanted, because a message of theirs was missed.
+    """
+
+    def __init__(self, agent_id: str, num_agents: int, *, incarnation: int, full_every: int) -> None:
+        super().__init__(agent_id, incarnation=incarnation)
+        self.full_every = full_every
+        self.asked: set[int] = set()
+        self._previous = 0
+        self._since_full = 0
+        self._told_heard: StampArray = np.full(num_agents, NOT_LISTED, np.int64)
+
+    def has_news(self, digest: int) -> bool:
+        """Whether something is wanted or untold, changed beliefs aside."""
+        return bool(self.asked) or super().has_news(digest)
 
     def say(
         self,
@@ -83,18 +112,15 @@ class Voice:
         full = (
             self._previous == 0 or heartbeat or self.full_for > 0 or self._since_full >= self.full_every - 1
         )
-        self.stamp += 1
-        if own_stamps:
-            beliefs.heard[beliefs.me] = self.stamp
         digest = beliefs.digest
-        if digest != self._told_digest:
-            self._told_digest = digest
-            self._digest_at = self.stamp
+        stamp, digest_at = self.next_stamp(now, digest)
+        if own_stamps:
+            beliefs.heard[beliefs.me] = stamp
         tasks, winners, bids, heard = beliefs.compose(full, self._told_heard)
         holders, held_at = agreement.tell(digest, everything=full)
         message = Beliefs(
             sender=self.agent_id,
-            sequence=self.stamp,
+            sequence=stamp,
             since=0 if full else self._previous,
             agent_ids=arrays.agent_ids,
             task_ids=arrays.task_ids,
@@ -103,7 +129,7 @@ class Voice:
             winners=winners,
             bids=bids,
             digest=digest,
-            digest_at=self._digest_at,
+            digest_at=digest_at,
             agreed=holders,
             agreed_at=held_at,
             asked=np.array(sorted(self.asked), np.int32) if self.asked else NO_ROWS,
@@ -111,8 +137,6 @@ class Voice:
             left_at=np.array(list(left.values()), np.int64) if left else NO_STAMPS,
             settled=settled,
         )
-        self._previous = self.stamp
+        self._previous = stamp
         self._since_full = 0 if full else self._since_full + 1
-        self.full_for = max(self.full_for - 1, 0)
-        self.last_spoken = now
         return message

@@ -115,7 +115,7 @@ class CBBA(ConsensusAuction):
     def unsupported(cls, mission: Mission) -> list[str]:
         """One agent does each task, in any order."""
         reasons = []
-        several = [task.id for task in mission.tasks if task.agents_required > 1]
+        several = [task.id for task in mission.tasks if task.is_group]
         ordered = [task.id for task in mission.tasks if task.prerequisites]
         if several:
             reasons.append(f"{_some(several)} more than one agent")

@@ -14,7 +14,7 @@ import sys
 import typer
 
 from swarmbid import __version__
-from swarmbid.cli import bench, listing, plan, schema, simulate, why
+from swarmbid.cli import bench, listing, plan, reproduce, schema, simulate, why
 from swarmbid.cli.output import complain
 from swarmbid.errors import InputError
 
@@ -30,6 +30,7 @@ app.command("plan")(plan.plan)
 app.command("simulate")(simulate.simulate)
 app.command("why")(why.why)
 app.command("bench")(bench.bench)
+app.command("reproduce")(reproduce.reproduce)
 app.command("schema")(schema.schema)
 app.command("list")(listing.list_)
 

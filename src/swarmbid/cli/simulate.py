@@ -22,6 +22,9 @@ def simulate(
     seed: Seed = 0,
     agents: Annotated[int | None, typer.Option(min=0, help="Agents of a scenario.")] = None,
     tasks: Annotated[int | None, typer.Option(min=0, help="Tasks of a scenario.")] = None,
+    agents_required: Annotated[
+        int | None, typer.Option(min=1, help="Agents for each task of a scenario with groups.")
+    ] = None,
     option: Annotated[
         list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Further options of a scenario.")
     ] = None,
@@ -56,7 +59,8 @@ def simulate(
     from swarmbid.network import Network, agent_positions, make_topology
 
     check_writable(output, report, trace, given=Path(what))
-    mission = _mission(what, seed, agents, tasks, option or [])
+    counts = {"agents": agents, "tasks": tasks, "agents_required": agents_required}
+    mission = _mission(what, seed, counts, option or [])
     num_agents = max(len(mission.agents), 1)
     network = Network(
         make_topology(
@@ -91,8 +95,14 @@ def simulate(
     raise typer.Exit(status)
 
 
-def _mission(what: str, seed: int, agents: int | None, tasks: int | None, settings: list[str]) -> Any:
-    """Load a file, or make a scenario."""
+def _mission(what: str, seed: int, counts: dict[str, int | None], settings: list[str]) -> Any:
+    """Load a file, or make a scenario.
+
+    Parameters
+    ----------
+    counts : options of a scenario that have an option of the command line of their own; None if not given.
+    settings : others, each as NAME=VALUE.
+    """
     from swarmbid import registry
     from swarmbid.missionfile import load_mission
 
@@ -102,7 +112,7 @@ def _mission(what: str, seed: int, agents: int | None, tasks: int | None, settin
         if not path.exists() and path.suffix == "" and len(path.parts) == 1:
             mend = did_you_mean(what, known) or "Scenarios: " + ", ".join(known) + "."
             raise InputError([Fault(what, "", "is neither a file nor a scenario", mend)])
-        given = {"--agents": agents, "--tasks": tasks, "--set": settings or None}
+        given = {**{_typed(name): count for name, count in counts.items()}, "--set": settings or None}
         faults = [
             Fault(name, "", f"is for scenarios, and {what} is a mission file", "Leave it out.")
             for name, value in given.items()
@@ -114,9 +124,13 @@ def _mission(what: str, seed: int, agents: int | None, tasks: int | None, settin
     module = registry.load("scenarios", what)
     options: dict[str, Any] = {item.name: item.default for item in fields(module.OPTIONS)}
     chosen: dict[str, Any] = {}
-    for name, count in (("agents", agents), ("tasks", tasks)):
-        if count is not None:
-            chosen[name] = count
+    for name, count in counts.items():
+        if count is None:
+            continue
+        if name not in options:
+            mend = "It has: " + ", ".join(options) + "."
+            raise InputError([Fault(_typed(name), "", f"is no option of {what}", mend)])
+        chosen[name] = count
     for setting in settings:
         name, equals, text = setting.partition("=")
         if not equals or name not in options:
@@ -130,6 +144,11 @@ def _mission(what: str, seed: int, agents: int | None, tasks: int | None, settin
                 [Fault(f"--set {setting}", "", f"{text!r} is no {kind.__name__}", "Give a number.")]
             ) from None
     return module.make(seed, **chosen)
+
+
+def _typed(name: str) -> str:
+    """Return an option as it is typed: ``--agents-required``."""
+    return "--" + name.replace("_", "-")
 
 
 def _partition(text: str, mission: Any) -> Any:

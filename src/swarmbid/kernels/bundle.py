@@ -34,7 +34,7 @@ from swarmbid.arrays import (
     Y,
     Z,
 )
-from swarmbid.kernels.insertion import HOLD, evaluate, path_state, visit_value
+from swarmbid.kernels.insertion import HOLD, evaluate, first_position, path_state, visit_value
 from swarmbid.kernels.lanes import BLOCK, distance_between
 
 # Rows of the two bundle tables, int64[NUM_ORDER_ROWS, limit] and float64[NUM_MARK_ROWS, limit].
@@ -117,7 +117,7 @@ def weigh(
         columns[i] = ranking[batch[i]]
     evaluate(
         tasks, columns, count, agent, path, length, starts, legs, values, total, rule,
-        gains, position, start_time,
+        first_position(rule, length), length, gains, position, start_time,
     )  # fmt: skip
     for i in range(count):
         place = batch[i]
@@ -284,7 +284,7 @@ def build_bundle(
             columns[0] = task
             evaluate(
                 tasks, columns, 1, agent, path, length, starts, legs, values, total, rule,
-                gains, position, start_time,
+                first_position(rule, length), length, gains, position, start_time,
             )  # fmt: skip
             place, promised = position[0], start_time[0]
             if same:

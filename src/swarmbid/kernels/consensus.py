@@ -60,6 +60,24 @@ def digest_of(task_hash, agent_hash, winner, bid_bits):
 
 
 @njit(cache=True)
+def digest_of_stamps(agent_hash, task_hash, stamps, present, bars, context):
+    """Hash of whose record is how new, of who must not bid on what, and of the roster and the tasks.
+
+    Parameters
+    ----------
+    stamps : int64[num_agents]. present : bool[num_agents], whose records count.
+    bars : int64[n, 2], rows of agents and tasks. context : uint64, hash of the roster and the tasks.
+    """
+    total = context
+    for m in range(stamps.shape[0]):
+        if present[m]:
+            total += belief_hash(agent_hash[m], np.uint64(0), np.uint64(stamps[m]))
+    for k in range(bars.shape[0]):
+        total += belief_hash(task_hash[bars[k, 1]], agent_hash[bars[k, 0]], np.uint64(1))
+    return total
+
+
+@njit(cache=True)
 def believe(j, new_winner, new_bid, winner, bid, bid_bits, task_hash, agent_hash, digest):
     """Set one belief and keep the digest in step."""
     old = agent_hash[winner[j]] if winner[j] != NO_AGENT else np.uint64(0)

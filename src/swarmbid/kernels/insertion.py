@@ -112,16 +112,24 @@ def path_state(tasks, agent, path, length, hold_times, rule, starts, legs, value
 
 
 @njit(cache=True, error_model="numpy")
+def first_position(rule, length):
+    """The first position that a rule lets a task be inserted at; the last is always `length`."""
+    return length if rule == APPEND else 0
+
+
+@njit(cache=True, error_model="numpy")
 def evaluate(
-    tasks, columns, count, agent, path, length, starts, legs, values, total, rule, gain, position, start_time
-):
+    tasks, columns, count, agent, path, length, starts, legs, values, total, rule, begin, end_at,
+    gain, position, start_time,
+):  # fmt: skip
     """Best insertion of some tasks into a path; the earliest position wins ties.
 
     Parameters
     ----------
     tasks, agent, path, length : as in `path_state`, which made `starts`, `legs`, `values`, `total`.
     columns : int64[>= count], the tasks to insert, at most BLOCK of them.
-    rule : HOLD, SHIFT or APPEND.
+    rule : HOLD or SHIFT; APPEND is SHIFT at the end only.
+    begin, end_at : first and last position tried; see `first_position`.
     gain : float64[>= count], written; -inf where the task fits nowhere.
     position : int64[>= count], written. start_time : float64[>= count], written, s.
     """
@@ -149,7 +157,6 @@ def evaluate(
                 tasks[X, final], tasks[Y, final], tasks[Z, final],
                 agent[BASE_X], agent[BASE_Y], agent[BASE_Z], step,
             )  # fmt: skip
-    begin = length if rule == APPEND else 0
 
     lanes = whole_vectors(count)
     for j in range(lanes):
@@ -169,7 +176,7 @@ def evaluate(
         x, y, z = tasks[X, before], tasks[Y, before], tasks[Z, before]
     distance_lanes(x, y, z, xs, ys, zs, lanes, step, leg_out)
 
-    for n in range(begin, length + 1):
+    for n in range(begin, end_at + 1):
         # Leave the previous visit, or the agent's own place.
         departure = agent[AVAILABLE]
         if n > 0:

@@ -192,11 +192,11 @@ def _refuse_coupled(mission: Mission) -> None:
     faults = []
     for task in mission.tasks:
         for name, coupled, why in (
-            ("agents_required", task.agents_required > 1, f"is {task.agents_required}"),
+            ("agents_required", task.is_group, f"is {task.agents_required}"),
             ("prerequisites", bool(task.prerequisites), f"are {', '.join(task.prerequisites)}"),
         ):
             if coupled:
-                mend = "The exact optimum takes tasks that one agent does on its own; leave this one out."
+                mend = "This takes tasks that one agent does on its own; coalition_optimum takes the others."
                 faults.append(Fault(f"task {task.id}", name, why, mend))
     if faults:
         raise InputError(faults)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from swarmbid.model import Mission, Task
 from swarmbid.negotiator import Negotiator
-from swarmbid.testing._team import Broken, Check, Make, Team, mission_of
+from swarmbid.testing._team import Broken, Check, Make, Team, held_by, mission_of
 
 FEW_AND_MANY = ((4, 3), (3, 7))
 """Numbers of agents and tasks: a task for each, and more than that."""
@@ -42,8 +42,8 @@ def cancel_task(make: Make) -> None:
             for name, one in team.agents.items():
                 if task in team.path_tasks(name):
                     raise Broken(f"{name} still plans a cancelled task")
-                if one.beliefs()[task][0] is not None:
-                    raise Broken(f"{name} believes that {one.beliefs()[task][0]} wins a cancelled task")
+                if one.beliefs()[task]:
+                    raise Broken(f"{name} believes that {one.beliefs()[task][0][0]} wins a cancelled task")
             team.check_assignment()
     _refuses(make, "cancel_task", lambda one: one.cancel_task("nothing"))
 
@@ -214,31 +214,30 @@ def _tell(team: Team, command: Callable[[Negotiator], None], *, apart: bool) -> 
 
 
 def _settle_without(team: Team, gone: str, what: str) -> None:
-    """Let `gone` say its last words and the others agree."""
-    for _ in range(3):
+    """Let `gone` say its last words and the others agree.
+
+    It stays in reach for as long as an answer needs to cross the team: on a line, it takes the link away.
+    """
+    for _ in range(2 * len(team.agents)):
         team.round()
     del team.agents[gone]
     team.settle(what)
     for name, one in team.agents.items():
-        for task, (winner, _) in one.beliefs().items():
-            if winner == gone and task not in _done(team, gone):
+        for task in held_by(gone, one):
+            if task not in _done(team, gone):
                 raise Broken(f"{name} believes that {gone} wins {task}, although it has left")
 
 
 def _done(team: Team, gone: str) -> set[str]:
     """Tasks that all believe to be won by one that is gone, and that nobody plans: finished ones."""
-    believed = [
-        {task for task, (winner, _) in one.beliefs().items() if winner == gone}
-        for one in team.agents.values()
-    ]
+    believed = [held_by(gone, one) for one in team.agents.values()]
     return set.intersection(*believed) if getattr(team, "now_started", 0.0) else set()
 
 
 def _check_nothing_won_by(team: Team, gone: str) -> None:
     for name, one in team.agents.items():
-        for task, (winner, _) in one.beliefs().items():
-            if winner == gone:
-                raise Broken(f"{name} believes that {gone} wins {task}, although it is lost")
+        for task in held_by(gone, one):
+            raise Broken(f"{name} believes that {gone} wins {task}, although it is lost")
 
 
 def _refuses(make: Make, name: str, command: Callable[[Negotiator], None]) -> None:

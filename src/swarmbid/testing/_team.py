@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from swarmbid.errors import SwarmbidError
-from swarmbid.messages import Beliefs, decode, encode
+from swarmbid.messages import KINDS, decode, encode
 from swarmbid.model import Agent, Mission, Task
 from swarmbid.negotiator import Event, Negotiator
 from swarmbid.network import make_topology
@@ -196,7 +196,7 @@ class Team:
     def _post(self, sender: str, messages: list[Any]) -> None:
         for message in messages:
             self.sent.append((self.now, sender, message))
-            carried = decode(encode(message)) if self._wire and isinstance(message, Beliefs) else message
+            carried = decode(encode(message)) if self._wire and isinstance(message, KINDS) else message
             for receiver in self.neighbours[sender]:
                 for _ in range(self._copies):
                     if self._loss and self._rng.random() < self._loss:
@@ -242,18 +242,23 @@ class Team:
                 raise Broken(
                     f"{names[0]} and {name} have equal digests and unequal beliefs{self._difference()}"
                 )
+        seats = {task.id: task.agents_required or len(names) for task in self.mission.tasks}
         doers: dict[str, list[str]] = {}
         for name, one in self.agents.items():
             for task, _ in one.path:
                 doers.setdefault(task, []).append(name)
         for task, who in doers.items():
-            if len(who) > 1:
-                raise Broken(f"{' and '.join(who)} both plan {task}")
-            if first[task][0] != who[0]:
-                raise Broken(f"{who[0]} plans {task}, but all believe that {first[task][0]} wins it")
-        for task, (winner, bid) in first.items():
-            if winner is not None and winner in self.agents and winner not in doers.get(task, []):
-                raise Broken(f"all believe that {winner} wins {task} (bid {bid:g}), but it does not plan it")
+            if len(who) > seats[task]:
+                raise Broken(f"{' and '.join(who)} all plan {task}, which has seats for {seats[task]}")
+            strangers = [name for name in who if name not in dict(first[task])]
+            if strangers:
+                raise Broken(f"{strangers[0]} plans {task}, but all believe that {first[task]} win it")
+        for task, holders in first.items():
+            for holder, bid in holders:
+                if holder in self.agents and holder not in doers.get(task, []):
+                    raise Broken(
+                        f"all believe that {holder} wins {task} (bid {bid:g}), but it does not plan it"
+                    )
         if physics:
             self.check_physics(self.mission)
 
@@ -267,6 +272,11 @@ class Team:
     def path_tasks(self, name: str) -> list[str]:
         """Ids of what an agent plans, in order of visit."""
         return [task for task, _ in self.agents[name].path]
+
+
+def held_by(agent_id: str, one: Negotiator) -> set[str]:
+    """Tasks that an agent holds, as far as `one` knows."""
+    return {task for task, holders in one.beliefs().items() if agent_id in dict(holders)}
 
 
 def state(one: Negotiator) -> tuple[Any, ...]:
