@@ -190,6 +190,20 @@ def test_what_is_under_way_has_to_come_first():
         decode(encode(message(record(states=np.array([0, STARTED], np.int8)))))
 
 
+def test_a_record_of_more_than_its_agent_may_take_is_dropped():
+    """Two tasks are all there are: a record of three would only make room that nobody needs."""
+    agent = CBGA("a", PAIRS)
+    rows = np.array([0, 1, 0], np.int32)
+    three = record(
+        states=np.zeros(3, np.int8), tasks=rows, bids=np.ones(3), gains=np.ones(3), positions=rows,
+        leads=np.full(3, NOBODY, np.int32),
+    )  # fmt: skip
+    before = agent.digest
+    agent.receive(message(three), 1.0)
+    assert agent.events() == [MessageDropped("b", "bundle")]
+    assert agent.digest == before
+
+
 def test_a_message_of_another_algorithm_is_dropped():
     mission = missions(3, "single")
     said = CBBA("a1", mission).tick(0.0)[0]

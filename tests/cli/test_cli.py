@@ -122,6 +122,10 @@ WRONG = {
     "simulate uniform --set width=x": "--set width=x: 'x' is no float. Give a number.",
     "simulate uniform --set wdth=3": "--set wdth=3: names no option of uniform. Did you mean 'width'?",
     "simulate uniform --set reward_min=0": "uniform: reward_min: is 0.0. Give more than 0.",
+    "plan QUICK --with full_evry=1": "names no option of cbba. Did you mean 'full_every'?",
+    "plan QUICK --with full_every=x": "--with full_every=x: 'x' is no value of it. Give a number.",
+    "plan QUICK -a cbga --with quitting=3": "'3' is no value of it. Give true or false.",
+    "plan QUICK -a cbga --with dissolve=7": "dissolve: is 7.0. Give a share from 0 to 1.",
     "simulate QUICK --partition 3": "--partition 3: is not of the form START:END:IDS.",
     "simulate QUICK --partition a:3:scout": "--partition a:3:scout: START and END are not numbers.",
     "simulate QUICK --partition 1:3:scuot": "there is no agent 'scuot'. Did you mean 'scout'?",
@@ -255,3 +259,12 @@ def test_an_interrupt_stops_at_once_without_a_word(tmp_path: Path):
     assert (running.returncode, out, err) == (-signal.SIGINT, "", "")
     assert not (tmp_path / "t.jsonl").exists()
     assert read_trace(partial, partial=True).header.algorithm == "cbba"
+
+
+def test_an_algorithm_takes_its_options_from_the_command_line(swarmbid):
+    """Team rewards fill other groups than the agents' own gains do; both runs agree."""
+    words = ["simulate", "hunt2014", "-a", "cbga", "--agents", "5", "--agents-required", "2", "--seed", "3"]
+    own = swarmbid(*words, "--json")
+    team = swarmbid(*words, "--json", "--with", "team_rewards=true", "--with", "quit_after=none")
+    plans = [json.loads(typed.out)["plan"]["agents"] for typed in (own, team)]
+    assert plans[0] != plans[1]

@@ -236,6 +236,10 @@ class JointPlan:
         """Whether a task's group has all its members and equipment."""
         return bool(complete(self._terms.seats, self._joint.filled, self._joint.missing, task))
 
+    def limit(self, row: int) -> int:
+        """Most tasks that an agent may take (L_t)."""
+        return int(self._terms.limits[row])
+
     def full(self, task: int) -> bool:
         """Whether every seat of a task is taken."""
         terms = self._terms

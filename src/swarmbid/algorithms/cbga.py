@@ -137,7 +137,12 @@ class CBGA(Conversation[RecordsVoice]):
     def _understand(self, message: Message) -> Message:
         if not isinstance(message, Records):
             raise MessageError("malformed", "is of another algorithm")
-        return translated(message, self._arrays)
+        message = translated(message, self._arrays)
+        for owner, record in zip(message.owners.tolist(), message.records, strict=True):
+            # Room is made for the longest record there is, so nobody may claim more than it can hold.
+            if record.wanted > self._plan.limit(owner) or record.tasks.size > self._arrays.num_tasks:
+                raise MessageError("bundle", "a record holds more than its agent may take")
+        return message
 
     def _absorb(self, sender: int, message: Message, now: float) -> None:
         assert isinstance(message, Records)

@@ -18,6 +18,10 @@ Insertion = Annotated[
         help="hold (promised times stay), shift (later visits may slip) or append; the score's own."
     ),
 ]
+With = Annotated[
+    list[str] | None,
+    typer.Option("--with", metavar="NAME=VALUE", help="Options of the algorithm, e.g. team_rewards=true."),
+]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of everything that is random.")]
 PlanFile = Annotated[Path | None, typer.Option("-o", "--output", help="Write the plan here, JSON.")]
 Report = Annotated[Path | None, typer.Option(help="Write one self-contained HTML page here.")]
@@ -32,6 +36,7 @@ def plan(
     algorithm: Algorithm = "cbba",
     score: ScoreName = None,
     insertion: Insertion = None,
+    option: With = None,
     seed: Seed = 0,
     output: PlanFile = None,
     report: Report = None,
@@ -42,6 +47,7 @@ def plan(
 
     With -o or --report and no --trace, the trace is written beside that file, for `swarmbid why`.
     """
+    from swarmbid.cli.options import algorithm_options
     from swarmbid.cli.output import check_writable
     from swarmbid.cli.running import carry_out
     from swarmbid.missionfile import load_mission
@@ -56,6 +62,7 @@ def plan(
         algorithm=algorithm,
         score=score,
         insertion=insertion,
+        options=algorithm_options(algorithm, option or []),
         network=None,
         seed=seed,
         mode="rounds",

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from swarmbid.cli.plan import Algorithm, AsJson, Insertion, PlanFile, Report, ScoreName, Seed, TraceFile
+from swarmbid.cli.plan import Algorithm, AsJson, Insertion, PlanFile, Report, ScoreName, Seed, TraceFile, With
 from swarmbid.errors import Fault, InputError, did_you_mean
 
 
@@ -19,6 +19,7 @@ def simulate(
     algorithm: Algorithm = "cbba",
     score: ScoreName = None,
     insertion: Insertion = None,
+    algorithm_option: With = None,
     seed: Seed = 0,
     agents: Annotated[int | None, typer.Option(min=0, help="Agents of a scenario.")] = None,
     tasks: Annotated[int | None, typer.Option(min=0, help="Tasks of a scenario.")] = None,
@@ -54,6 +55,7 @@ def simulate(
     as_json: AsJson = False,
 ) -> None:
     """Rehearse a mission file or a scenario (`swarmbid list`) on a network with faults, all from one seed."""
+    from swarmbid.cli.options import algorithm_options
     from swarmbid.cli.output import check_writable
     from swarmbid.cli.running import carry_out
     from swarmbid.network import Network, agent_positions, make_topology
@@ -83,6 +85,7 @@ def simulate(
         algorithm=algorithm,
         score=score,
         insertion=insertion,
+        options=algorithm_options(algorithm, algorithm_option or []),
         network=network,
         seed=seed,
         mode="asynchronous" if asynchronous else "rounds",
