@@ -165,7 +165,7 @@ This page is written by `swarmbid reproduce hunt2014 --write docs/hunt2014.md`. 
   text is followed. Two things are added that the paper does not have, without which it seldom ends in a state
   worth comparing: bids are warped, and tasks that waiting for others has made too late are released.
 - **repaired** is `cbga`, the default of this package: owned records and one referee.
-  [The algorithms](explanation/algorithms.md) tells more. Half of the incomplete groups are dissolved at a
+  [Why CBGA settles](explanation/cbga.md) tells more. Half of the incomplete groups are dissolved at a
   time where task quitting is on. Tasks for one agent are given to `cbba`, as in the paper.
 
 Only seats of completed tasks are paid, whatever state a run ends in. The paper's plots are not available to
