@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks import insertion, instances, plain_cbba
+from benchmarks import coalitions, insertion, instances, plain_cbba
 from benchmarks.measure import Table, interleave, median_ratio
 
 from swarmbid.kernels.insertion import HOLD, SHIFT
@@ -88,3 +88,9 @@ def test_the_c_library_leaves_the_arithmetic_of_the_process_alone(tmp_path: Path
     insertion.build(compiler, tmp_path / "insertion.so")
     insertion.load(tmp_path / "insertion.so")
     assert np.float64(5e-324) * 1.0 == 5e-324
+
+
+def test_the_group_benchmark_measures_runs_that_agree():
+    found = coalitions.measure(4, 8, 3, "distance_cost")
+    assert found["status"] == "converged"
+    assert found["cpu"] > 0.0 and found["bytes"] > found["messages"] > 0
