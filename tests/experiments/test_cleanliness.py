@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from swarmbid.experiments._cleanliness import State, completed_score, joint_starts, judge_state
+from swarmbid.experiments._cleanliness import State, joint_starts, judge_state
 from swarmbid.messages import Message
 from swarmbid.model import Agent, Mission, Task
 from swarmbid.simulator import simulate
@@ -155,14 +155,6 @@ def test_who_goes_on_changing_is_not_at_rest_and_is_not_touched():
     state = judge_state([one], mission)  # type: ignore[list-item]
     assert (state["quiescent"], state["clean"]) == (False, False)
     assert one.digest == 1
-
-
-def test_the_papers_score_pays_each_member_of_completed_groups_and_takes_off_all_metres():
-    """t, 10 m away: 2 * 100 - 2 * 10. u has one of two members: no reward, but a flies 10 m more."""
-    mission = mission_of(task("t"), task("u", 20.0))
-    beliefs: dict[str, Any] = {"t": (), "u": ()}
-    crew = [Fixed("a", beliefs, ["t", "u"]), Fixed("b", beliefs, ["t"])]
-    assert completed_score(crew, mission) == 200.0 - 20.0 - 10.0  # type: ignore[arg-type]
 
 
 def test_a_real_run_is_judged_as_it_ended():

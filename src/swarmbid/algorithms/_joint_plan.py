@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swarmbid.algorithms._bundle import RULES
+from swarmbid.algorithms._groups import incomplete, is_complete, members
 from swarmbid.algorithms._terms import cover_of, make_terms
 from swarmbid.arrays import AGENT_X, AGENT_Z, AVAILABLE, NO_AGENT, RANGE, IntArray, MissionArrays, RowArray
 from swarmbid.kernels import coalition
-from swarmbid.kernels.joint import complete, empty_joint
+from swarmbid.kernels.joint import empty_joint
 from swarmbid.kernels.offers import LENGTH, empty_own
 from swarmbid.kernels.ranks import AGENT, BID, GAIN, JOINS, KEY_SLOTS, LEAD, PLACE, STAGE, rearrange
 from swarmbid.messages.records import BIDDING, Place, Record, empty_record
@@ -40,11 +41,12 @@ class JointPlan:
         num_slots = int(self._terms.slot_at[-1])
         self._joint = empty_joint(arrays.num_agents, arrays.num_tasks, num_slots)
         owner = arrays.agents[me] if me != NO_AGENT else None
-        self._fixed = None if owner is None else score.fixed(arrays, owner)
+        fixed = None if owner is None else score.fixed(arrays, owner)
         limit = 0 if owner is None else arrays.bundle_limit(owner)
         vector = np.zeros(0) if owner is None else self._terms.agents[me].copy()
-        fixed = np.zeros(0) if self._fixed is None else self._fixed
-        self._own = empty_own(self._terms.tasks.copy(), fixed, vector, limit)
+        self._own = empty_own(
+            self._terms.tasks.copy(), np.zeros(0) if fixed is None else fixed, vector, limit
+        )
         self.records: list[Record] = [empty_record() for _ in arrays.agents]
         self._dirty: dict[int, int] = {}  # rows with new records -> entries of the old one that still stand
         self._again = True
@@ -229,12 +231,11 @@ class JointPlan:
 
     def members(self, task: int) -> list[int]:
         """Rows of the agents that have a seat at a task, in order of id."""
-        begin = int(self._terms.slot_at[task])
-        return sorted(self._joint.holder[begin : begin + int(self._joint.filled[task])].tolist())
+        return members(self._terms, self._joint, task)
 
     def complete(self, task: int) -> bool:
         """Whether a task's group has all its members and equipment."""
-        return bool(complete(self._terms.seats, self._joint.filled, self._joint.missing, task))
+        return is_complete(self._terms, self._joint, task)
 
     def limit(self, row: int) -> int:
         """Most tasks that an agent may take (L_t)."""
@@ -259,23 +260,8 @@ class JointPlan:
         return found
 
     def incomplete(self) -> list[int]:
-        """Tasks that have members, but not all that they need, the worst first.
-
-        The worst has the smallest share of its seats filled, then the smallest sum of its members' gains,
-        then the smallest id.
-        """
-        joint, terms = self._joint, self._terms
-        found = []
-        for task in np.flatnonzero(joint.filled > 0).tolist():
-            if self.complete(task):
-                continue
-            if terms.seats[task] > 0:
-                share = float(joint.filled[task]) / float(terms.seats[task])
-            else:
-                wanted = int(terms.full[terms.kind[task]]).bit_count()
-                share = 1.0 - int(joint.missing[task]).bit_count() / wanted
-            found.append((share, sum(self.gain(row, task) for row in self.members(task)), task))
-        return [task for _, _, task in sorted(found)]
+        """Tasks that have members, but not all that they need, the worst first."""
+        return incomplete(self._terms, self._joint, self.gain)
 
     def gain(self, row: int, task: int) -> float:
         """What an agent's record says that a task gains it; 0 if it says nothing."""

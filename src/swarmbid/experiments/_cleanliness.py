@@ -142,31 +142,6 @@ def joint_starts(mission: Mission, paths: Mapping[str, Sequence[str]]) -> dict[s
     return starts
 
 
-def completed_score(negotiators: Sequence[Negotiator], mission: Mission) -> float:
-    """What the paper counts: the rewards of completed tasks, each member paid, less metres flown.
-
-    A task is completed if it has a member for each seat and their equipment is all that it needs; what
-    agents wait for in vain is not paid, and the way to it is flown all the same.
-    """
-    tasks = {task.id: task for task in mission.tasks}
-    agents = {agent.id: agent for agent in mission.agents}
-    crews: dict[str, list[str]] = defaultdict(list)
-    metres = 0.0
-    for one in negotiators:
-        place = agents[one.agent_id].position
-        for task_id, _ in one.path:
-            crews[task_id].append(one.agent_id)
-            metres += mission.distance(place, tasks[task_id].position)
-            place = tasks[task_id].position
-    rewards = 0.0
-    for task_id, crew in crews.items():
-        task = tasks[task_id]
-        seats = task.agents_required or len(crew)
-        if len(crew) >= seats and not _missing(task, crew, agents):
-            rewards += seats * task.reward
-    return rewards - metres
-
-
 def _held_by_themselves(negotiators: Sequence[Negotiator]) -> dict[str, list[str]]:
     """Task id -> agents that believe that they hold it: each is asked about itself."""
     held: dict[str, list[str]] = defaultdict(list)

@@ -167,11 +167,9 @@ def rewind(terms, joint, log, records, own, me, first):
                 own.sizes[LENGTH] -= 1
         log.sizes[ITEMS] = keep
         log.sizes[JOURNAL] = log.ends[keep - 1] if keep > log.sizes[BASE] else 0
-    own.held[:] = False
     seat = joint.first[me]
     for k in range(own.sizes[LENGTH]):
         own.path[k] = terms.slot_task[seat]
-        own.held[own.path[k]] = True
         seat = joint.after[seat]
     at = np.int64(0)
     if keep > 0:

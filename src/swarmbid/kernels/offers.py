@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from swarmbid.arrays import NO_AGENT, OPEN, READY, FloatArray, RowArray
 from swarmbid.kernels.bundle import before
@@ -38,7 +37,6 @@ class Own(NamedTuple):
     path : int64[limit + 1]; starts, legs, values : float64[limit + 1]; total : float64[1], m.
     claim : float64[num_tasks], what each candidate may be said to gain; place : int64[num_tasks], where.
     blocked : int64[num_tasks], bits of positions that the referee refused on this path.
-    held : bool[num_tasks], whether it is on the path.
     key, trial, last : float64[KEY_SLOTS], ranks of the best candidate, of the one compared with it, and of
         the agent's last entry.
     columns, places : int64[BLOCK]; single : int64[1]; gains, times : float64[BLOCK]; scratch.
@@ -64,7 +62,6 @@ class Own(NamedTuple):
     place: RowArray
     blocked: RowArray
     seen: RowArray
-    held: NDArray[np.bool_]
     key: FloatArray
     trial: FloatArray
     last: FloatArray
@@ -98,7 +95,6 @@ def empty_own(table: FloatArray, fixed: FloatArray, vector: FloatArray, limit: i
         place=np.zeros(num_tasks, np.int64),
         blocked=np.zeros(num_tasks, np.int64),
         seen=np.zeros(num_tasks, np.int64),
-        held=np.zeros(num_tasks, np.bool_),
         key=np.zeros(KEY_SLOTS),
         trial=np.zeros(KEY_SLOTS),
         last=np.zeros(KEY_SLOTS),
@@ -292,5 +288,4 @@ def take_best(own):
     for k in range(length, place, -1):
         own.path[k] = own.path[k - 1]
     own.path[place] = j
-    own.held[j] = True
     own.sizes[LENGTH] = length + 1

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarmbid.algorithms._bundle import RULES
+from swarmbid.algorithms._groups import incomplete, is_complete, members
 from swarmbid.algorithms._terms import make_terms
 from swarmbid.arrays import MissionArrays
-from swarmbid.kernels.joint import clear, complete, empty_joint
+from swarmbid.kernels.joint import clear, empty_joint
 from swarmbid.kernels.offers import (
     BEST,
     LENGTH,
@@ -78,11 +79,11 @@ def coalition_greedy(
     planner = _Planner(MissionArrays(mission), make_score(score), insertion, team_rewards)
     while True:
         planner.run()
-        worst = planner.incomplete() if quitting else []
+        worst = incomplete(planner.terms, planner.joint, planner.gain) if quitting else []
         if not worst:
             return planner.result()
         for task in worst[: max(1, math.ceil(dissolve * len(worst)))]:
-            for row in planner.members(task):
+            for row in members(planner.terms, planner.joint, task):
                 planner.terms.allowed[row, task] = False
 
 
@@ -152,44 +153,25 @@ class _Planner:
                 pick(terms, joint, other, row, team)
         return True
 
-    def members(self, task: int) -> list[int]:
-        """Rows of the agents seated at a task, in order of id."""
-        return sorted(row for row, at, _ in self.seats if at == task)
-
-    def complete(self, task: int) -> bool:
-        """Whether a task's group has all that it needs."""
-        return bool(complete(self.terms.seats, self.joint.filled, self.joint.missing, task))
-
-    def incomplete(self) -> list[int]:
-        """Tasks whose groups are incomplete, the worst first (see `JointPlan.incomplete`)."""
-        terms, joint = self.terms, self.joint
-        found = []
-        for task in sorted({task for _, task, _ in self.seats}):
-            if self.complete(task):
-                continue
-            if terms.seats[task] > 0:
-                share = float(joint.filled[task]) / float(terms.seats[task])
-            else:
-                wanted = int(terms.full[terms.kind[task]]).bit_count()
-                share = 1.0 - int(joint.missing[task]).bit_count() / wanted
-            found.append((share, sum(self.gain(row, task) for row in self.members(task)), task))
-        return [task for _, _, task in sorted(found)]
-
     def gain(self, row: int, task: int) -> float:
+        """What a task gained an agent when it took it."""
         own = self.owns[row]
         return float(own.gain[: own.sizes[LENGTH]][own.task[: own.sizes[LENGTH]] == task][0])
 
     def result(self) -> CoalitionResult:
+        """Return the paths of complete groups, and all seats."""
         arrays, joint = self.arrays, self.joint
         paths: dict[str, list[tuple[str, float]]] = {}
         for row, agent_id in enumerate(arrays.agent_ids):
             own = self.owns[row]
             path = [int(task) for task in own.path[: own.sizes[LENGTH]]]
             paths[agent_id] = [
-                (arrays.task_ids[task], float(joint.start[task])) for task in path if self.complete(task)
+                (arrays.task_ids[task], float(joint.start[task]))
+                for task in path
+                if is_complete(self.terms, joint, task)
             ]
         return CoalitionResult(
             paths=paths,
             seats=tuple((arrays.agent_ids[row], arrays.task_ids[task], bid) for row, task, bid in self.seats),
-            incomplete=tuple(arrays.task_ids[task] for task in self.incomplete()),
+            incomplete=tuple(arrays.task_ids[task] for task in incomplete(self.terms, joint, self.gain)),
         )

@@ -67,16 +67,7 @@ def legend_below(figure: Figure, handles: Sequence[Any]) -> None:
 
 def as_svg(figure: Figure) -> str:
     """Return a figure as SVG; the same figure gives the same bytes."""
-    return _saved(figure, "svg", {"Date": None, "Creator": "swarmbid"}).decode()
-
-
-def as_png(figure: Figure) -> bytes:
-    """Return a figure as PNG, to look at."""
-    return _saved(figure, "png", {"Software": "swarmbid"})
-
-
-def _saved(figure: Figure, kind: str, metadata: dict[str, str | None]) -> bytes:
     target = io.BytesIO()
     with styled():
-        figure.savefig(target, format=kind, metadata=metadata, dpi=110)
-    return target.getvalue()
+        figure.savefig(target, format="svg", metadata={"Date": None, "Creator": "swarmbid"}, dpi=110)
+    return target.getvalue().decode()
