@@ -1,6 +1,6 @@
 """Run the benchmarks: `python -m benchmarks [--quick] [--write PAGE] [name ...]`.
 
-The names are insertion, runs, scale, startup and coalitions; all by default.
+The names are insertion, runs, scale, startup and coalitions, all by default, and quality.
 Exit status 1 if a promise was missed.
 """
 
@@ -14,6 +14,8 @@ from pathlib import Path
 from benchmarks.measure import Table, describe_machine
 
 NAMES = ("insertion", "runs", "scale", "startup", "coalitions")
+ON_REQUEST = ("quality",)
+"""Run only when named: it takes an hour."""
 
 INTRODUCTION = """# Benchmarks
 
@@ -27,16 +29,21 @@ def main() -> int:
     """Run what the command line asks for."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Measure swarmbid's speed.")
     parser.add_argument(
-        "names", nargs="*", metavar="name", help=f"some of {', '.join(NAMES)}; all by default"
+        "names",
+        nargs="*",
+        metavar="name",
+        help=f"{', '.join(NAMES)} (the default), or {', '.join(ON_REQUEST)}",
     )
     parser.add_argument(
         "--quick", action="store_true", help="fewer repeats, and a tenth of the largest mission"
     )
     parser.add_argument("--write", type=Path, metavar="PAGE", help="also write the figures to this page")
     options = parser.parse_args()
-    unknown = [name for name in options.names if name not in NAMES]
+    unknown = [name for name in options.names if name not in NAMES + ON_REQUEST]
     if unknown:
-        parser.error(f"no benchmark is called {', '.join(unknown)}; there are {', '.join(NAMES)}")
+        parser.error(
+            f"no benchmark is called {', '.join(unknown)}; there are {', '.join(NAMES + ON_REQUEST)}"
+        )
     machine = describe_machine()
     print("\n".join(machine))
     tables: list[Table] = []

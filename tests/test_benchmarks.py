@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks import coalitions, insertion, instances, plain_cbba
+from benchmarks import coalitions, insertion, instances, plain_cbba, quality
 from benchmarks.measure import Table, interleave, median_ratio
 
 from swarmbid.kernels.insertion import HOLD, SHIFT
@@ -94,3 +94,9 @@ def test_the_group_benchmark_measures_runs_that_agree():
     found = coalitions.measure(4, 8, 3, "distance_cost")
     assert found["status"] == "converged"
     assert found["cpu"] > 0.0 and found["bytes"] > found["messages"] > 0
+
+
+def test_cbga_ends_clean_where_the_print_to_the_letter_does_not():
+    """Pairs with windows: of the first two missions of the page's table the print ends neither clean."""
+    shares = {name: quality.clean_share("L2", True, options, 2) for name, options in quality.READINGS}
+    assert (shares["literal"], shares["cbga"]) == (0.0, 1.0)
