@@ -95,6 +95,58 @@ class TaskQuit(Event):
 
 
 @dataclass(frozen=True)
+class Said(Event):
+    """The agent said something in a conversation about a task.
+
+    Parameters
+    ----------
+    performative : FIPA name ("cfp", "propose" ...). to : id of the receiver; empty for all.
+    conversation : task, manager and epoch.
+    bid : of a proposal, an award or a contract. detail : reason, or what else was said.
+    """
+
+    kind = "act"
+    task: str
+    performative: str
+    to: str
+    conversation: str
+    bid: float | None
+    detail: str
+
+
+@dataclass(frozen=True)
+class Stage(Event):
+    """The agent's state in a conversation about a task changed.
+
+    Parameters
+    ----------
+    role : "manager" or "contractor". state : the new one.
+    """
+
+    kind = "stage"
+    task: str
+    role: str
+    state: str
+
+
+@dataclass(frozen=True)
+class TaskEnded(Event):
+    """The agent knows a task to have ended.
+
+    Parameters
+    ----------
+    outcome : "done", "failed", "cancelled" or "unserved". by : id of who did it; empty for nobody.
+    reason : why it was not done.
+    """
+
+    kind = "ended"
+    task: str
+    outcome: str
+    by: str
+    reason: str
+
+
+@dataclass(frozen=True)
 class MessageDropped(Event):
     """A message was not taken in, and changed nothing.
 

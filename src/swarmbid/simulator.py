@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
-from typing import IO, Any
+from typing import IO, Any, cast
 
 from swarmbid import __version__, registry
 from swarmbid.arrays import MissionArrays
@@ -346,7 +346,7 @@ class _Run:
         self._bytes += size
         self._entries += message.entries
         if self.through_bytes:
-            message = decode(encode(message))
+            message = cast(Message, decode(encode(message)))
         deliveries = network.deliveries(row, self.now)
         for arrival, receivers in deliveries:
             self._push(arrival, message, receivers)

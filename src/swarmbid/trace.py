@@ -26,17 +26,26 @@ from msgspec import Struct
 from swarmbid.errors import Fault, InputError
 from swarmbid.tracerecords import RECORD_KINDS as RECORD_KINDS
 from swarmbid.tracerecords import TRACE_VERSION as TRACE_VERSION
+from swarmbid.tracerecords import Act as Act
 from swarmbid.tracerecords import Agreed as Agreed
+from swarmbid.tracerecords import Crashed as Crashed
+from swarmbid.tracerecords import Detected as Detected
+from swarmbid.tracerecords import Divided as Divided
 from swarmbid.tracerecords import Doubted as Doubted
 from swarmbid.tracerecords import Dropped as Dropped
+from swarmbid.tracerecords import Ended as Ended
 from swarmbid.tracerecords import Header as Header
 from swarmbid.tracerecords import Known as Known
 from swarmbid.tracerecords import Outbid as Outbid
+from swarmbid.tracerecords import Pose as Pose
 from swarmbid.tracerecords import Quit as Quit
 from swarmbid.tracerecords import Released as Released
 from swarmbid.tracerecords import Result as Result
 from swarmbid.tracerecords import Sent as Sent
+from swarmbid.tracerecords import Stage as Stage
 from swarmbid.tracerecords import Taken as Taken
+from swarmbid.tracerecords import Tracked as Tracked
+from swarmbid.tracerecords import Truth as Truth
 
 if TYPE_CHECKING:
     from swarmbid.model import Mission
@@ -343,7 +352,10 @@ def _fault(where: str, why: str, mend: str) -> InputError:
     return InputError([Fault(where, "", why, mend)])
 
 
+_DRIVERS = (Header, Sent, Pose, Truth, Tracked, Crashed, Result)
 EVENT_RECORDS: dict[str, type[Any]] = {
-    str(kind.__struct_config__.tag): kind for kind in RECORD_KINDS if kind not in (Header, Sent, Result)
+    str(kind.__struct_config__.tag): kind for kind in RECORD_KINDS if kind not in _DRIVERS
 }
-"""Kind of a negotiator's event -> its record, whose fields are the event's, with time and agent."""
+"""Kind of a negotiator's or a behaviour's event -> its record: the event's fields, time and agent.
+
+What only a driver knows has records of its own."""

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import msgspec
 
-from swarmbid.messages._base import Message
+from swarmbid.messages._base import Broadcast, Message
 from swarmbid.messages._columns import (
     INCARNATION,
     MAX_BYTES,
@@ -28,9 +28,11 @@ from swarmbid.messages._columns import (
     MessageError,
     StampArray,
 )
+from swarmbid.messages.acts import Acts, ActsWire
 from swarmbid.messages.assignments import Assignments, AssignmentsWire
 from swarmbid.messages.beliefs import Beliefs, BeliefsWire
 from swarmbid.messages.records import Records, RecordsWire
+from swarmbid.messages.survey import Survey, SurveyWire
 
 __all__ = [
     "INCARNATION",
@@ -41,30 +43,34 @@ __all__ = [
     "NOBODY",
     "NOT_LISTED",
     "VERSION",
+    "Acts",
     "Assignments",
     "Beliefs",
+    "Broadcast",
     "FloatArray",
     "IntArray",
     "Message",
     "MessageError",
     "Records",
     "StampArray",
+    "Survey",
     "decode",
     "encode",
 ]
 
-KINDS: tuple[type[Message], ...] = (Assignments, Beliefs, Records)
+KINDS: tuple[type[Broadcast], ...] = (Acts, Assignments, Beliefs, Records, Survey)
 """The kinds that `decode` can read back."""
 
-_decoder = msgspec.msgpack.Decoder(AssignmentsWire | BeliefsWire | RecordsWire)
+Wire = ActsWire | AssignmentsWire | BeliefsWire | RecordsWire | SurveyWire
+_decoder = msgspec.msgpack.Decoder(Wire)
 
 
-def encode(message: Message) -> bytes:
+def encode(message: Broadcast) -> bytes:
     """Return the bytes of a message."""
     return message.encode()
 
 
-def decode(data: bytes) -> Message:
+def decode(data: bytes) -> Broadcast:
     """Return the message in `data`.
 
     Raises
@@ -74,7 +80,7 @@ def decode(data: bytes) -> Message:
     if len(data) > MAX_BYTES:
         raise MessageError("oversize", f"{len(data)} bytes, more than {MAX_BYTES}")
     try:
-        wire: AssignmentsWire | BeliefsWire | RecordsWire = _decoder.decode(data)
+        wire: Wire = _decoder.decode(data)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:
         raise MessageError("malformed", str(error)) from None
     return wire.message()

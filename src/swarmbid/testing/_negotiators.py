@@ -6,12 +6,12 @@ import dataclasses
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
 from swarmbid.errors import SwarmbidError
-from swarmbid.messages import KINDS, Beliefs, decode, encode
+from swarmbid.messages import KINDS, Beliefs, Message, decode, encode
 from swarmbid.negotiator import (
     Agreed,
     Doubted,
@@ -241,7 +241,7 @@ def survives_mangled_bytes(make: Make) -> None:
             message = decode(bytes(data))
         except SwarmbidError:
             continue
-        one.receive(message, team.now)
+        one.receive(cast(Message, message), team.now)
         team.now += 1.0
         one.tick(team.now)
         known = {agent.id for agent in team.mission.agents}
