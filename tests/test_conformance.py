@@ -16,6 +16,7 @@ from swarmbid.algorithms.cbaa import CBAA
 from swarmbid.algorithms.cbba import CBBA
 from swarmbid.algorithms.cbga import CBGA
 from swarmbid.algorithms.cbga_printed import CBGAPrinted
+from swarmbid.algorithms.contract_net import ContractNet
 from swarmbid.arrays import PEAK, REWARD, FloatArray, MissionArrays
 from swarmbid.messages import Message
 from swarmbid.model import Agent, Mission, Task
@@ -52,6 +53,9 @@ VARIANTS: dict[str, tuple[type[Negotiator], dict[str, Any]]] = {
         CBGAPrinted,
         {"warp": True, "quitting": True, "quit_after": 4.0, "team_rewards": True},
     ),
+    "contract_net": (ContractNet, {}),
+    "contract_net hold": (ContractNet, HOLD),
+    "contract_net append": (ContractNet, {"insertion": "append"}),
 }
 
 

@@ -80,6 +80,9 @@ class Conversation(Negotiator, Generic[V]):
     def _absorb(self, sender: int, message: Message, now: float) -> None:
         """Take in what a message says."""
 
+    def _hear_from_gone(self, message: Message, now: float) -> None:
+        """Take in what stands even if it is said by one that is gone: nothing, for most."""
+
     @abstractmethod
     def _decide(self, now: float) -> None:
         """Weigh what was taken in and change the agent's own plan, if anything changed."""
@@ -127,6 +130,11 @@ class Conversation(Negotiator, Generic[V]):
         # What is said of digests stands on its own, so it counts even where the rest cannot.
         self._agreement.hear(sender, message)
         if message.sequence <= self._left.get(sender, 0):
+            # Two that gave each other up would stay deaf to each other for ever.
+            for row, stamp in zip(message.left.tolist(), message.left_at.tolist(), strict=True):
+                if row == self._me:
+                    self._note_left(row, stamp)
+            self._hear_from_gone(message, now)
             return "gone"
         reason = self._missed(sender, message)
         if reason is not None:
