@@ -24,7 +24,7 @@ $(BIN)/python:
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check uv || echo "no uv; pip will do"
 
 $(PACKAGE): pyproject.toml | $(BIN)/python
-	$(call install)
+	$(call install,[search])
 
 $(DEV): pyproject.toml | $(BIN)/python
 	$(call install,[dev])

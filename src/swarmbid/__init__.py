@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from swarmbid.simulator import simulate as simulate
     from swarmbid.trace import read_trace as read_trace
     from swarmbid.verify import verify as verify
+    from swarmbid.worldsim import fly as fly
 
 __version__ = "0.1.0"
 
@@ -48,6 +49,7 @@ _HOMES = {
     "Run": "simulator",
     "SwarmbidError": "errors",
     "Task": "model",
+    "fly": "worldsim",
     "load_mission": "missionfile",
     "make_score": "scores",
     "make_topology": "network",
