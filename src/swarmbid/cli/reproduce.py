@@ -12,7 +12,7 @@ from swarmbid.errors import Fault, InputError, did_you_mean
 
 
 def reproduce(
-    name: Annotated[str, typer.Argument(metavar="PAPER", help="A paper: hunt2014.")],
+    name: Annotated[str, typer.Argument(metavar="PAPER", help="A paper: hunt2014 or dymkou2019.")],
     quick: Annotated[bool, typer.Option(help="Fewer runs, at fewer numbers of agents.")] = False,
     figure: Annotated[list[int] | None, typer.Option(metavar="N", help="One of its figures only.")] = None,
     runs: Annotated[int | None, typer.Option(min=1, help="Runs a point; the paper's by default.")] = None,
@@ -68,7 +68,10 @@ def _paper(name: str) -> Any:
 
     experiment = registry.load("experiments", name)
     if not hasattr(experiment, "FIGURES"):
-        papers = ["hunt2014"]
-        mend = did_you_mean(name, papers) or f"Run `swarmbid bench {name}`, or reproduce hunt2014."
+        known = registry.names("experiments")
+        papers = [one for one in known if hasattr(registry.load("experiments", one), "FIGURES")]
+        mend = did_you_mean(name, papers) or (
+            f"Run `swarmbid bench {name}`, or reproduce {' or '.join(papers)}."
+        )
         raise InputError([Fault(name, "", "is a benchmark, not a paper with figures", mend)])
     return experiment

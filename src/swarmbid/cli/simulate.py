@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from swarmbid.cli.plan import Algorithm, AsJson, Insertion, PlanFile, Report, ScoreName, Seed, TraceFile, With
+from swarmbid.cli.plan import AsJson, Insertion, PlanFile, Report, ScoreName, Seed, TraceFile, With
 from swarmbid.errors import Fault, InputError, did_you_mean
 
 
@@ -16,7 +16,10 @@ def simulate(
     what: Annotated[
         str, typer.Argument(metavar="MISSION|SCENARIO", help="A mission file, or a scenario's name.")
     ],
-    algorithm: Algorithm = "cbba",
+    algorithm: Annotated[
+        str | None,
+        typer.Option("-a", "--algorithm", help="See `swarmbid list`; cbba, or contract_net for a search."),
+    ] = None,
     score: ScoreName = None,
     insertion: Insertion = None,
     algorithm_option: With = None,
@@ -58,11 +61,35 @@ def simulate(
     from swarmbid.cli.options import algorithm_options
     from swarmbid.cli.output import check_writable
     from swarmbid.cli.running import carry_out
+    from swarmbid.model import Mission
     from swarmbid.network import Network, agent_positions, make_topology
 
     check_writable(output, report, trace, given=Path(what))
     counts = {"agents": agents, "tasks": tasks, "agents_required": agents_required}
     mission = _mission(what, seed, counts, option or [])
+    if not isinstance(mission, Mission):
+        given = {
+            "--score": score, "--insertion": insertion, "--mean-degree": mean_degree, "--burst": burst,
+            "--range": communication_range, "--duplicate": duplicate or None, "--partition": partition,
+            "--asynchronous": asynchronous or None, "--max-rounds": max_rounds, "--output": output,
+            "--graph": None if graph == "complete" else graph,
+        }  # fmt: skip
+        raise typer.Exit(
+            _search(
+                mission,
+                what,
+                given,
+                algorithm,
+                algorithm_option or [],
+                seed,
+                loss,
+                delay,
+                trace,
+                report,
+                as_json,
+            )
+        )
+    algorithm = algorithm or "cbba"
     num_agents = max(len(mission.agents), 1)
     network = Network(
         make_topology(
@@ -96,6 +123,35 @@ def simulate(
         max_rounds=max_rounds,
     )
     raise typer.Exit(status)
+
+
+def _search(
+    mission: Any,
+    what: str,
+    given: dict[str, Any],
+    allocation: str | None,
+    settings: list[str],
+    seed: int,
+    loss: float,
+    delay: float,
+    trace: Path | None,
+    report: Path | None,
+    as_json: bool,
+) -> int:
+    """Fly a scenario that is a search; `given` holds options that only a negotiation has."""
+    from swarmbid.cli.searching import fly_and_tell, search_options
+
+    faults = [
+        Fault(name, "", f"is for negotiations, and {what} is a search", "Leave it out; see --set and --with.")
+        for name, value in given.items()
+        if value is not None
+    ]
+    if faults:
+        raise InputError(faults)
+    return fly_and_tell(
+        mission, allocation=allocation or "contract_net", options=search_options(settings, mission),
+        seed=seed, loss=loss, delay=delay, trace=trace, report=report, as_json=as_json,
+    )  # fmt: skip
 
 
 def _mission(what: str, seed: int, counts: dict[str, int | None], settings: list[str]) -> Any:

@@ -24,6 +24,13 @@ def rounds_shown(what: str) -> Iterator[Callable[[float], None] | None]:
 
 
 @contextmanager
+def seconds_shown(what: str) -> Iterator[Callable[[float], None] | None]:
+    """Yield a function that shows the time, s, of a mission; None if standard error is no terminal."""
+    with _line(what) as write:
+        yield None if write is None else lambda now: write(f"{now:.0f} s")
+
+
+@contextmanager
 def cases_shown(what: str) -> Iterator[Callable[[int, int], None] | None]:
     """Yield a function that shows (done, total); None if standard error is no terminal."""
     with _line(what) as write:
