@@ -57,7 +57,7 @@ def draw(figure: int, results: Results, sizes: Sequence[int]) -> Figure:
     drawn, axes = panels([f"{VARIANTS[variant].title}" for variant in SHOWN])
     right: list[Any] = []
     for variant, left in zip(SHOWN, axes, strict=True):
-        other = left.twinx()
+        other: Any = left.twinx()
         other.grid(False)
         other.spines["top"].set_visible(False)
         right.append(other)

@@ -37,7 +37,8 @@ def styled() -> AbstractContextManager[None]:
     """Return the context within which figures are drawn and saved."""
     from matplotlib import rc_context
 
-    return rc_context(_STYLE)  # type: ignore[arg-type]
+    style: Any = _STYLE  # releases of matplotlib disagree about the type
+    return rc_context(style)
 
 
 def panels(
