@@ -164,7 +164,7 @@ def case_of(family: str, seed: int) -> Case:
     ids = sorted((agent.id for agent in mission.agents), key=str.encode)
     options: dict[str, Any] = {}
     if family == "hold" or (every and rng.random() < 0.3):
-        options = {"on_partition": "hold", "lease": rng.choice((8.0, 12.0))}
+        options = {"on_partition": "hold", "lease": rng.choice((20.0, 30.0))}
     if every and rng.random() < 0.3:
         options["take_over"] = True
     hold = options.get("on_partition") == "hold"

@@ -36,9 +36,10 @@ def sequential_auction(mission: Mission, tasks: Iterable[Task], score: Score, ru
         winner, bid, longer = None, 0.0, None
         for name, judge in judges.items():
             best = judge.best_insertion(paths[name], task)
-            if best is not None and len(paths[name]) < judge.limit() and best[0] > 0.0:
-                if outbids(best[0], name, bid, winner):
-                    winner, bid, longer = name, best[0], best[2]
+            if best is None or best[0] <= 0.0 or len(paths[name]) >= judge.limit():
+                continue
+            if outbids(best[0], name, bid, winner):
+                winner, bid, longer = name, best[0], best[2]
         winners[task.id], bids[task.id] = winner, bid
         if winner is not None and longer is not None:
             paths[winner] = longer

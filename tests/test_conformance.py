@@ -56,6 +56,7 @@ VARIANTS: dict[str, tuple[type[Negotiator], dict[str, Any]]] = {
     "contract_net": (ContractNet, {}),
     "contract_net hold": (ContractNet, HOLD),
     "contract_net append": (ContractNet, {"insertion": "append"}),
+    "contract_net take_over": (ContractNet, {"take_over": True}),
 }
 
 

@@ -15,7 +15,9 @@ from swarmbid.model import Agent, Mission, Task
 
 
 def proposal(bid: float, *path: str, worth: float = 0.0) -> Act:
-    return Act(1, PROPOSE, "new", AS_CONTRACTOR, bid=bid, path=tuple((name, 0.0) for name in path), worth=worth)
+    return Act(
+        1, PROPOSE, "new", AS_CONTRACTOR, bid=bid, path=tuple((name, 0.0) for name in path), worth=worth
+    )
 
 
 def test_a_manager_with_tasks_compares_the_diagonal():
@@ -38,6 +40,11 @@ def test_a_take_over_that_loses_what_it_gains_is_not_awarded():
     assert best(with_take_overs(proposals, 0, lambda act: 15.9)) == (1, 1)
     assert best(with_take_overs(proposals, 0, lambda act: 16.0)) == (1, 1)  # a tie moves nothing
     assert best(with_take_overs(proposals, 0, lambda act: 16.1)) == (0, 1)
+
+
+def test_a_take_over_that_is_no_better_moves_nothing_whoever_manages():
+    proposals = {1: proposal(7.0, "old", worth=9.0), 2: proposal(5.0)}
+    assert best(with_take_overs(proposals, 2, lambda act: 16.0)) == (1, 1)
 
 
 def test_what_the_manager_cannot_fly_is_not_awarded_to_it():

@@ -9,7 +9,8 @@ from __future__ import annotations
 import ast
 import importlib
 import pkgutil
-from importlib.metadata import entry_points
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
 from typing import TypeVar
@@ -21,6 +22,12 @@ T = TypeVar("T")
 FOLDERS = ("algorithms", "datasets", "experiments", "references", "scenarios", "scores")
 
 
+@cache
+def _installed(folder: str) -> tuple[EntryPoint, ...]:
+    """Plug-ins of other packages; looked for once, for it reads the metadata of all that is installed."""
+    return tuple(entry_points(group=f"swarmbid.{folder}"))
+
+
 def names(folder: str) -> list[str]:
     """Return the plug-ins of `folder`, in order of name, without importing any.
 
@@ -30,7 +37,7 @@ def names(folder: str) -> list[str]:
     """
     package = importlib.import_module(f"swarmbid.{folder}")
     own = [found.name for found in pkgutil.iter_modules(package.__path__) if not found.name.startswith("_")]
-    others = [found.name for found in entry_points(group=f"swarmbid.{folder}")]
+    others = [found.name for found in _installed(folder)]
     return sorted({*own, *others})
 
 
@@ -41,7 +48,7 @@ def load(folder: str, name: str) -> ModuleType:
     ------
     InputError : there is none of that name; the message lists those that there are.
     """
-    for found in entry_points(group=f"swarmbid.{folder}"):
+    for found in _installed(folder):
         if found.name == name:
             module: ModuleType = found.load()
             return module

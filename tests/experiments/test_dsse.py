@@ -72,7 +72,7 @@ def test_a_find_that_nobody_could_make_is_a_problem():
 
 def test_without_dsse_the_mend_is_told(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setitem(sys.modules, "DSSE", None)
-    with pytest.raises(InputError, match="pip install 'DSSE>=1.1.9'"):
+    with pytest.raises(InputError, match=r"pip install 'DSSE>=1\.1\.9'"):
         dsse.run(episodes=1)
 
 

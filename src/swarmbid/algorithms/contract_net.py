@@ -28,7 +28,7 @@ from swarmbid.algorithms._conversation import check_options
 from swarmbid.algorithms.cbba import CBBA
 from swarmbid.arrays import MissionArrays
 from swarmbid.errors import Fault
-from swarmbid.messages.acts import AS_CONTRACTOR, AS_MANAGER, CANCEL, REFUSALS, Ending
+from swarmbid.messages.acts import AS_CONTRACTOR, AS_MANAGER, CANCEL, Ending
 from swarmbid.model import Mission, Position, Task
 from swarmbid.negotiator import Said, TaskReleased
 from swarmbid.scores import Score, make_score
@@ -278,15 +278,8 @@ class ContractNet(ManagerSide):
         self._change()
 
     def fail_task(self, task_id: str, reason: str, now: float) -> None:
-        """Give a task up that this agent cannot do after all; it is called for again.
-
-        Parameters
-        ----------
-        reason : one of `messages.acts.REFUSALS` if the agent may take it again when that is over; after any
-            other it does not bid on the task any more.
-        """
-        event = "give back" if reason in REFUSALS else "fail"
-        if not self._step(AS_CONTRACTOR, self._known(task_id), event, now, why=reason[:200] or "failed"):
+        """Give a task up that this agent cannot do after all; it is called for again, among the others."""
+        if not self._step(AS_CONTRACTOR, self._known(task_id), "fail", now, why=reason[:200] or "failed"):
             raise ValueError(f"task {task_id} is not under contract with {self.agent_id}")
         self._change()
 

@@ -14,6 +14,7 @@ from collections.abc import Iterable
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swarmbid.arrays import FloatArray
 
@@ -140,7 +141,7 @@ def moved(
     joint : float64[hypotheses, rows, columns]. counters, rate : float64[hypotheses, 2], (x, y).
     matrix : float64[rows, columns], as observed before the step.
     """
-    moves = (np.abs(counters) >= 1.0).any(axis=1)
+    moves: NDArray[np.bool_] = np.any(np.abs(counters) >= 1.0, axis=1)
     counters = counters + rate
     if not moves.any():
         return joint, counters
@@ -158,7 +159,7 @@ def moved(
         for offset, weight in zip(offsets, around, strict=True):
             there += _shifted(here * (weight + (WALK if offset == (down, right) else 0.0)), offset)
         joint[those] = there
-    counters -= np.where(moves[:, None] & (np.abs(counters) >= 1.0), np.sign(counters), 0.0)
+    counters -= np.where(moves[:, np.newaxis] & (np.abs(counters) >= 1.0), np.sign(counters), 0.0)
     return joint, counters
 
 

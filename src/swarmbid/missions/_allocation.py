@@ -9,12 +9,15 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 from swarmbid.algorithms.cbba import CBBA
 from swarmbid.algorithms.contract_net import ContractNet
+from swarmbid.errors import InputError
 from swarmbid.messages import Message
+from swarmbid.messages.acts import REFUSALS
 from swarmbid.missions._contacts import Contacts
 from swarmbid.model import Mission, Task
 from swarmbid.negotiator import Event, Negotiator
@@ -173,8 +176,8 @@ class ByContract(_Negotiated):
         super().__init__(self.net)
 
     def at(self, state: VehicleState, free_at: float, now: float, contacts: Contacts) -> None:
-        """See `Allocation.at`; when it is free is for `may` to judge."""
-        super().at(state, now, now, contacts)
+        """See `Allocation.at`; whether it is free at all is for `may` to judge."""
+        super().at(state, now if math.isinf(free_at) else free_at, now, contacts)
 
     def standing_of(self, task: str) -> tuple[str, tuple[str, ...]]:
         """See `Allocation.standing_of`."""
@@ -201,7 +204,9 @@ class ByContract(_Negotiated):
     def fail(self, task: str, reason: str, now: float) -> None:
         """See `Allocation.fail`."""
         self._started.discard(task)
-        self.net.fail_task(task, reason, now)
+        # Who flies home to refuel may take it again; who has lost a target may not.
+        give_up = self.net.give_back if reason in REFUSALS else self.net.fail_task
+        give_up(task, reason, now)
 
     def cancel(self, task: str, reason: str) -> None:
         """See `Allocation.cancel`."""
@@ -228,6 +233,7 @@ class ByConsensus(_Negotiated):
         super().__init__(self.cbba)
         self._task_of = task_of
         self._known: set[str] = set()
+        self._agents = {one.id for one in roster.agents}
 
     def announce(self, task: Task, now: float, keep: bool = False) -> None:
         """See `Allocation.announce`: the contact is announcement enough."""
@@ -235,9 +241,10 @@ class ByConsensus(_Negotiated):
     def at(self, state: VehicleState, free_at: float, now: float, contacts: Contacts) -> None:
         """See `Allocation.at`."""
         for name, contact in contacts.known.items():
-            if name not in self._known:
-                self._known.add(name)
-                self.cbba.add_task(self._task_of(contact))
+            if name not in self._known and name not in self._agents:
+                with suppress(InputError):  # a peer may have told of a contact that can be no task
+                    self.cbba.add_task(self._task_of(contact))
+                    self._known.add(name)
             if contact.over and name not in self._ended:
                 self.cancel(name, "is over")
         super().at(state, free_at, now, contacts)

@@ -304,7 +304,9 @@ class SearchTrack:
         return task
 
     def _free_at(self, now: float) -> float:
-        """When the UAV is free for something new, s: whoever follows a target or refuels is not."""
+        """When the UAV is free for something new, s; never, for whoever follows a target or refuels."""
+        if self.dwelling is not None:
+            return self.dwelling[1] + self.mission.dwell
         started = self.following is not None and self.allocation.is_started(self.following)
         if started or self.mode in ("return", "base"):
             return math.inf
