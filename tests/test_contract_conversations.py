@@ -73,6 +73,10 @@ class Conversation(datadriven.Conversation):
         self.agents[words[0]].fail_task(words[1], " ".join(words[2:]), self.now)
         return self._events(words[0])
 
+    def do_give_back(self, words: list[str], details: list[str]) -> list[str]:
+        self.agents[words[0]].give_back(words[1], " ".join(words[2:]), self.now)
+        return self._events(words[0])
+
     def do_sub(self, words: list[str], details: list[str]) -> list[str]:
         self.agents[words[0]].sub_contract(words[1], self.now)
         return self._events(words[0])

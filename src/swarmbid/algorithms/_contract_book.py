@@ -56,7 +56,8 @@ class Book:
     floor : the highest epoch that this agent has heard of; what is said under a lower one is outdated.
     deadline : s, when it stops waiting for answers or for a confirmation.
     vacant : s, since when nobody leads, if that is so.
-    tries : calls in a row that nobody took up. barred : row -> act that was awarded in vain.
+    tries : calls in a row that nobody took up. vain : awards in a row that nobody confirmed in time.
+    barred : row -> act that was awarded in vain.
     """
 
     id: str
@@ -73,6 +74,7 @@ class Book:
     deadline: float = math.inf
     vacant: float = math.inf
     tries: int = 0
+    vain: int = 0
     barred: dict[int, int] = field(default_factory=dict)
     handing: bool = False
     keep: bool = False

@@ -235,7 +235,8 @@ class ManagerSide(Judge):
     def _manager_award(self, book: Book, now: float) -> None:
         book.chosen = self._best(book)
         book.tries = 0
-        book.deadline = now + self._confirm_within
+        # What is too far away for one deadline is within the next: else an award is revoked for ever.
+        book.deadline = now + self._confirm_within * min(2.0**book.vain, MOST_PERIODS)
         won = book.answers[book.chosen]
         self._say_act(
             ACCEPT, book, AS_MANAGER, to=self._arrays.agent_ids[book.chosen], manager=self.agent_id,
@@ -254,6 +255,7 @@ class ManagerSide(Judge):
             book.barred[book.chosen] = act.number
         name = self._arrays.agent_ids[book.chosen]
         self._report(book.calls[self._me], name, REJECT, "did not confirm in time")
+        book.vain += 1
         self._manager_next_best(book, now)
 
     def _manager_contract(self, book: Book, now: float) -> None:
@@ -261,7 +263,7 @@ class ManagerSide(Judge):
 
     def _put_in_force(self, book: Book, won: Act) -> None:
         book.deadline = math.inf
-        book.tries = 0
+        book.tries = book.vain = 0
         name = self._arrays.agent_ids[book.chosen]
         act = self._say_act(
             INFORM, book, AS_MANAGER, to=name, manager=self.agent_id, epoch=book.epoch, asked=book.asked,
