@@ -9,27 +9,33 @@ cannot say anything else than the program does. The tests make them again and co
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields
+from io import BytesIO
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 from typer.models import ArgumentInfo
 
 from swarmbid import registry
+from swarmbid.algorithms import _contract_tables as contract
 from swarmbid.algorithms.cbba import DECISION_RULES
 from swarmbid.cli import app
 from swarmbid.kernels import consensus
 from swarmbid.missionfile import load_mission, mission_schema
+from swarmbid.missions import charts
 from swarmbid.plan import REASONS
-from swarmbid.report import render_map_svg
+from swarmbid.report import render_film_strip, render_map_svg
+from swarmbid.scenarios import search_track
 from swarmbid.scores import Score
 from swarmbid.simulator import simulate
-from swarmbid.trace import trace_schema
+from swarmbid.trace import read_trace, trace_schema
 from swarmbid.verify import RULES
+from swarmbid.worldsim import fly
 
 DOCS = Path(__file__).resolve().parent
 EXAMPLES = DOCS.parent / "examples"
+FILM_SEED, FILM_TARGET = 1, "m02"
 NOTE = "<!-- Written by `python -m docs.generate`; do not edit. -->\n\n"
 
 
@@ -46,6 +52,14 @@ def picture() -> str:
     """Draw the map of the demo's plan, the picture of the README."""
     mission = load_mission(EXAMPLES / "substations.yaml")
     return render_map_svg(mission, simulate(mission).plan) + "\n"
+
+
+def film_strip() -> str:
+    """Draw how one moving target of the default search is found, followed and handed over."""
+    record = BytesIO()
+    fly(search_track.make(seed=FILM_SEED), seed=FILM_SEED, trace=record)
+    record.seek(0)
+    return render_film_strip(read_trace(record), FILM_TARGET) + "\n"
 
 
 # --- the decision table
@@ -101,6 +115,109 @@ def _line(facts: int, action: int, names: dict[str, str]) -> str:
     needed = [text.format(**names) for fact, text in _FACTS.items() if facts & fact]
     done = _ACTIONS[action]
     return f"{done} if {' and '.join(needed)}" if needed else done
+
+
+# --- the Contract Net, and the charts of a search
+
+_MANAGER_DOES = {
+    "announce": "calls for proposals, under a new epoch",
+    "reopen": "calls for proposals again, under the next epoch",
+    "resume": "calls again under the next epoch; answers that were given still count",
+    "award": "offers the task to the best proposal",
+    "next_best": "moves to the next epoch, for the next best proposal",
+    "revoke": "takes the award back; the late confirmation will mean nothing",
+    "contract": "puts the contract in force, and so tells the losers",
+    "take": "takes the task itself, at once",
+    "take_over": "takes the task, and claims the rest of the best bidder's path",
+    "claim": "awards itself what another holds and has not started",
+    "adopt": "leaves the task with who holds it, under its own next epoch",
+    "lift": "lets the contract stand, under an epoch above all that it heard of",
+    "keep": "goes on with the task itself: nobody takes it over",
+    "park": "lets the task rest, with the reasons that were given",
+    "inherit": "leaves the task at rest, as the manager before it did",
+    "back_off": "waits, twice as long each time",
+    "give_up": "ends the task for good, with the reasons",
+    "withdraw": "leaves the task to the other manager",
+    "close": "lets go of the conversation",
+}
+_CONTRACTOR_DOES = {
+    "propose": "sends its bid, with the path and the start that it rests on",
+    "refuse": "sends the reason why it cannot",
+    "confirm": "confirms, and keeps the place in its path",
+    "decline": "says that the proposal has been withdrawn",
+    "take": "is under contract, and says so",
+    "renew": "stays under contract, under the newer epoch",
+    "drop": "thinks no more of it; what was proposed was only proposed",
+    "release": "takes it out of its path, and says so",
+    "give_back": "gives it back, with the reason",
+    "hand_over": "lets go of it: its successor has begun",
+    "start": "says that it has begun",
+    "finish": "says that it is done",
+    "fail": "says that it failed, and why",
+    "close": "lets go of the conversation",
+}
+
+
+def contract_tables() -> str:
+    """Print the two tables of the Contract Net, row by row."""
+    return (
+        NOTE + "# The tables of the Contract Net\n\n"
+        "What an agent does about whatever comes, for each task and each of its two roles. [The Contract "
+        "Net](contract-net.md) explains the words. The tables are data that agents look up, and this page "
+        "is printed from them. They are total: what is not listed here changes nothing.\n\n"
+        "Where several things have come, they are looked for in the order of the table, and the first that "
+        "means anything is acted upon.\n\n"
+        "## The manager\n\nStates: "
+        + _words(contract.MANAGER_STATES)
+        + ".\n\n"
+        + _transitions(contract.MANAGER, contract.MANAGER_EVENTS, _MANAGER_DOES)
+        + "\n## The contractor\n\nStates: "
+        + _words(contract.CONTRACTOR_STATES)
+        + ".\n\n"
+        + _transitions(contract.CONTRACTOR, contract.CONTRACTOR_EVENTS, _CONTRACTOR_DOES)
+    )
+
+
+def _transitions(table: contract.Table, events: tuple[str, ...], does: dict[str, str]) -> str:
+    """One row for each event and what it leads to, the states from which it does so together."""
+    rows = []
+    for event in events:
+        found: dict[tuple[str, str], list[str]] = {}
+        for (state, what), (action, after) in table.items():
+            if what == event and action != contract.NOTHING:
+                found.setdefault((action, after), []).append(state)
+        for (action, after), states in found.items():
+            rows.append((event, ", ".join(states), does[action], f"**{after}**"))
+    return _table(("what came", "in state", "the agent", "next state"), rows)
+
+
+def search_charts() -> str:
+    """Print the two statecharts of the search-and-track mission."""
+    return (
+        NOTE + "# The statecharts of a search\n\n"
+        "What the words of the Contract Net mean to a UAV of a [search](search-and-track.md), for each "
+        'target, after the slides\' "Manager statecharts" and "Potential contractors statecharts". This '
+        "page is printed from `swarmbid.missions.charts`, by which the UAVs go. What is not listed leaves "
+        "the state as it is.\n\n## A manager: the UAV that found the target\n\n"
+        + _moves(charts.MANAGER_CHART, charts.MANAGER_STATES)
+        + "\n## A potential contractor: a UAV that hears of it\n\n"
+        + _moves(charts.CONTRACTOR_CHART, charts.CONTRACTOR_STATES)
+    )
+
+
+def _moves(chart: Mapping[tuple[str, str], str], states: tuple[str, ...]) -> str:
+    rows = []
+    for state in states:
+        found: dict[str, list[str]] = {}
+        for (before, event), after in chart.items():
+            if before == state and after != state:
+                found.setdefault(after, []).append(event)
+        rows += [(state, "; or ".join(events), f"**{after}**") for after, events in found.items()]
+    return _table(("in state", "what happens", "next state"), rows)
+
+
+def _words(names: Iterable[str]) -> str:
+    return ", ".join(f"`{name}`" for name in names)
 
 
 # --- the mission file
@@ -292,7 +409,10 @@ def _table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
 
 PAGES: dict[str, Callable[[], str]] = {
     "images/substations.svg": picture,
+    "images/search-film.svg": film_strip,
     "explanation/decision-table.md": decision_table,
+    "explanation/contract-tables.md": contract_tables,
+    "explanation/search-charts.md": search_charts,
     "reference/command-line.md": command_line,
     "reference/mission-file.md": mission_file,
     "reference/trace.md": trace_format,
