@@ -178,9 +178,8 @@ class Comparison:
         return f"{missions}\n{verdict}"
 
     def problems(self) -> list[str]:
-        """Return what broke: by ours, on a good radio, nothing found may be forgotten by everybody."""
-        left = sum(one.unserved for one in self.measures[OURS.name])
-        return [f"{left} targets were found and served by nobody"] if left else []
+        """Return where the mission falls behind something simpler: that is what it must not do."""
+        return self.worse()
 
     def to_dict(self) -> dict[str, Any]:
         """Return it ready for JSON."""
