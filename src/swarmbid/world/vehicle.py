@@ -245,17 +245,11 @@ def take_off(vehicle: Vehicle, state: VehicleState, now: float) -> bool:
 def _way_home(vehicle: Vehicle, state: VehicleState, area: Area) -> tuple[tuple[Point, ...], float]:
     """Return the places on the way to the base, and the bound of its s."""
     assert vehicle.base is not None
-    here = (state.x, state.y)
-    # A turn may have swung out of the area; the way home leads back in, not along outside.
-    inside = area.nearest(here)
-    best = area.route(inside, vehicle.base)
-    if inside != here:
-        best = (inside, *best)
+    best = area.route((state.x, state.y), vehicle.base)
     seconds = _bound(vehicle, state, best)
     if state.way and state.way[-1] == vehicle.base:
         known = _bound(vehicle, state, state.way)
-        # Far from the limit the last look is long ago, and what lies between may be a no-fly zone.
-        if known < seconds and (here == state.way[0] or area.clear(inside, state.way[0])):
+        if known < seconds:
             return state.way, known
     return best, seconds
 
