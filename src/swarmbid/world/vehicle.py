@@ -198,15 +198,17 @@ def must_return(vehicle: Vehicle, state: VehicleState, area: Area, horizon: floa
         return remaining(vehicle, state) <= vehicle.reserve + horizon
     if state.homeward:
         return True
-    margin = 2.0 * horizon + TURN * vehicle.turn_radius / vehicle.speed
+    turn = TURN * vehicle.turn_radius / vehicle.speed
+    margin = 2.0 * horizon + turn
     if state.slack > margin and state.way:
         # Far from the limit the way home need not be looked for in each step.
         spent = state.airborne - state.seen_at[0]
         moved = math.dist((state.x, state.y), state.way[0])
         honest = spent >= 0.0 and moved <= state.flown - state.seen_at[1] + 1e-6
-        if honest and state.slack - 2.0 * spent > max(2.0 * margin, 0.5 * state.slack):
+        # Corners that lie between by now may each cost a turn.
+        if honest and state.slack - 2.0 * spent > max(2.0 * margin + 2.0 * turn, 0.5 * state.slack):
             return False
-    way, seconds = _way_home(vehicle, state, area)
+    way, seconds = _way_home(vehicle, state, area, horizon * vehicle.speed)
     state.way = ((state.x, state.y), *way)
     state.slack = remaining(vehicle, state) - vehicle.reserve - seconds
     state.seen_at = (state.airborne, state.flown)
@@ -242,14 +244,28 @@ def take_off(vehicle: Vehicle, state: VehicleState, now: float) -> bool:
     return True
 
 
-def _way_home(vehicle: Vehicle, state: VehicleState, area: Area) -> tuple[tuple[Point, ...], float]:
-    """Return the places on the way to the base, and the bound of its s."""
+def _way_home(
+    vehicle: Vehicle, state: VehicleState, area: Area, back: float = 0.0
+) -> tuple[tuple[Point, ...], float]:
+    """Return the places on the way to the base, and the bound of its s.
+
+    Parameters
+    ----------
+    back : m, how far the UAV may go back the way it came, be it through the zone that a turn swung into.
+    """
     assert vehicle.base is not None
-    best = area.route((state.x, state.y), vehicle.base)
+    here = (state.x, state.y)
+    # A turn may have swung out of the area; the way home leads back in, not along outside.
+    inside = area.nearest(here)
+    best = area.route(inside, vehicle.base)
+    if inside != here:
+        best = (inside, *best)
     seconds = _bound(vehicle, state, best)
     if state.way and state.way[-1] == vehicle.base:
         known = _bound(vehicle, state, state.way)
-        if known < seconds:
+        last = state.way[0]
+        # Far from the limit the last look is long ago, and what lies between may be a no-fly zone.
+        if known < seconds and (math.dist(here, last) <= back or area.clear(inside, last)):
             return state.way, known
     return best, seconds
 
