@@ -65,8 +65,8 @@ class Notes(Allocation):
         self.done.append(("fail", task, reason))
         self.todo.remove(task)
 
-    def cancel(self, task, reason):
-        self.done.append(("cancel", task, reason))
+    def cancel(self, task):
+        self.done.append(("cancel", task))
         self.todo = [one for one in self.todo if one != task]
 
     def hand_over(self, task, now):
@@ -167,7 +167,7 @@ class TestAnnouncing:
         earlier = Contact("u2-t1", "u2", 0.0, False, 49.0, 420.0, 400.0, 0.0, 0.0, 1.0)
         one.receive(survey(contacts=(earlier,)), 50.0)
         list(hover(one, 10, begin=50))
-        assert ("cancel", "u1-t1", "is u2-t1") in one.allocation.done
+        assert ("cancel", "u1-t1") in one.allocation.done
         assert one.contacts.known["u1-t1"].over and not one.contacts.known["u2-t1"].over
 
     def test_the_earlier_finder_does_not(self):
@@ -210,7 +210,7 @@ class TestDoing:
         one.receive(survey(contacts=(over,)), 0.0)
         one.allocation.todo = ["u2-t1"]
         list(hover(one, 1))
-        assert one.allocation.done == [("cancel", "u2-t1", "is over")] and one.mode == "search"
+        assert one.allocation.done == [("cancel", "u2-t1")] and one.mode == "search"
 
     def test_a_few_blinks_do_not_end_a_track_but_long_silence_does(self):
         one = behaviour()

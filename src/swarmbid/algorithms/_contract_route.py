@@ -135,12 +135,6 @@ class Route:
             self._vector[AVAILABLE] = now
             self._change()
 
-    def spend(self, metres: float, latest_return: float) -> None:
-        """Say how far the agent may still fly, and until when, s."""
-        self._vector[RANGE] = metres
-        self._vector[LATEST_RETURN] = latest_return
-        self._change()
-
     def _change(self) -> None:
         self.version += 1
 

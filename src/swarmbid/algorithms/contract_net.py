@@ -290,12 +290,6 @@ class ContractNet(ManagerSide):
             raise ValueError(f"task {task_id} is not under contract with {self.agent_id}")
         self._change()
 
-    def set_fuel(self, metres: float, latest_return: float, now: float) -> None:
-        """Say how far the agent may still fly (m), and until when it must be back (s); bids count with it."""
-        self._route.spend(metres, latest_return)
-        self._keep_promises(now)
-        self._change()
-
     def sub_contract(self, task_id: str, now: float, before: float = math.inf) -> None:
         """Look for another to take over a task that this agent holds; if nobody can, it keeps it.
 

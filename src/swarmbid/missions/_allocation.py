@@ -86,7 +86,7 @@ class Allocation(ABC):
         """This UAV cannot do it."""
 
     @abstractmethod
-    def cancel(self, task: str, reason: str) -> None:
+    def cancel(self, task: str) -> None:
         """Nobody need do it."""
 
     @abstractmethod
@@ -208,7 +208,7 @@ class ByContract(_Negotiated):
         give_up = self.net.give_back if reason in REFUSALS else self.net.fail_task
         give_up(task, reason, now)
 
-    def cancel(self, task: str, reason: str) -> None:
+    def cancel(self, task: str) -> None:
         """See `Allocation.cancel`."""
         if task not in self._ended:
             self._ended.add(task)
@@ -246,7 +246,7 @@ class ByConsensus(_Negotiated):
                     self.cbba.add_task(self._task_of(contact))
                     self._known.add(name)
             if contact.over and name not in self._ended:
-                self.cancel(name, "is over")
+                self.cancel(name)
         super().at(state, free_at, now, contacts)
 
     def is_open(self, task: str) -> bool:
@@ -259,9 +259,9 @@ class ByConsensus(_Negotiated):
 
     def fail(self, task: str, reason: str, now: float) -> None:
         """See `Allocation.fail`: CBBA has no failure, so nobody does it again."""
-        self.cancel(task, reason)
+        self.cancel(task)
 
-    def cancel(self, task: str, reason: str) -> None:
+    def cancel(self, task: str) -> None:
         """See `Allocation.cancel`."""
         self._ended.add(task)
         self._started.discard(task)
@@ -362,7 +362,7 @@ class ByCentre(Allocation):
         if reason != "lost":
             self.centre.allocate(self.centre.tasks[task], now, without=self.agent)
 
-    def cancel(self, task: str, reason: str) -> None:
+    def cancel(self, task: str) -> None:
         """See `Allocation.cancel`."""
         for path in self.centre.paths.values():
             if task in path:

@@ -30,7 +30,7 @@ from swarmbid.model import Task
 from swarmbid.negotiator import Event, Stage
 from swarmbid.world.grid import Grid
 from swarmbid.world.mission import SearchMission
-from swarmbid.world.vehicle import Vehicle, VehicleState, must_return, remaining, time_home
+from swarmbid.world.vehicle import TURN, Vehicle, VehicleState, must_return, remaining, time_home
 
 LOST_AFTER = 45.0
 """s without a detection after which a followed target is given up."""
@@ -234,10 +234,10 @@ class SearchTrack:
         """Of two contacts that are one target, the earlier counts; who found the later one yields."""
         if now % CHECK_EVERY:
             return
-        for first, second in self.contacts.doubles(now):
+        for _, second in self.contacts.doubles(now):
             if self.contacts.known[second].by == self.id or self.following == second:
                 self.contacts.close(second, now)
-                self.allocation.cancel(second, f"is {first}")
+                self.allocation.cancel(second)
                 if self.following == second:
                     self._release()
 
@@ -275,7 +275,7 @@ class SearchTrack:
             if contact is None:
                 continue  # the contract was heard of before the contact: it comes with the next survey
             if contact.over:
-                self.allocation.cancel(task, "is over")
+                self.allocation.cancel(task)
                 continue
             if contact.moving:
                 return self._follow(task, contact, state, now)
@@ -326,7 +326,7 @@ class SearchTrack:
             return None
         place = task.position[:2]
         way = math.dist((state.x, state.y), place) + math.dist(place, vehicle.base)
-        turns = 3.0 * 7.0 * vehicle.turn_radius
+        turns = 3.0 * TURN * vehicle.turn_radius
         needed = (way + turns) / vehicle.speed + task.duration
         return "no_fuel" if remaining(vehicle, state) - vehicle.reserve < needed + FUEL_MARGIN else None
 
