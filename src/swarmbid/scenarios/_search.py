@@ -16,19 +16,6 @@ from swarmbid.world.vehicle import Vehicle
 Point = tuple[float, float]
 
 
-def chosen(where: str, kind: type[Any], options: dict[str, Any]) -> Any:
-    """Return the options of a scenario; InputError for one that there is not."""
-    known = [option.name for option in fields(kind)]
-    unknown = [
-        Fault(where, name, "is no option", f"Use some of {', '.join(known)}.")
-        for name in options
-        if name not in known
-    ]
-    if unknown:
-        raise InputError(unknown)
-    return kind(**options)
-
-
 def check(where: str, options: Any, lowest: Mapping[str, float], positive: tuple[str, ...]) -> None:
     """Raise InputError for every option below what it may be."""
     wrong = [
@@ -52,8 +39,11 @@ def check(where: str, options: Any, lowest: Mapping[str, float], positive: tuple
         raise InputError(faults)
 
 
-def square_with_hole(width: float, hole: float) -> Area:
+def square_with_hole(where: str, width: float, hole: float) -> Area:
     """A square from (0, 0) on, with a square no-fly zone of `hole` m north-east of its middle; 0 for none."""
+    if hole > 0.4 * width:
+        mend = f"Give at most {0.4 * width:g}, so that it fits."
+        raise InputError([Fault(where, "hole", f"is {hole:g}", mend)])
     boundary = ((0.0, 0.0), (width, 0.0), (width, width), (0.0, width))
     if hole <= 0.0:
         return Area(boundary)

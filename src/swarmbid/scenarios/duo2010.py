@@ -27,38 +27,35 @@ Examples
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from typing import Any
 
-from swarmbid.errors import Fault, InputError, did_you_mean
+from swarmbid.errors import Fault, InputError
 from swarmbid.model import Agent, Mission, Position, Task
 from swarmbid.rng import stream
+from swarmbid.scenarios._options import chosen, option
 
 TYPES = ("a", "b")
 """The types of agents; each carries its own name as equipment."""
-
-
-def _option(default: Any, meaning: str) -> Any:
-    return field(default=default, metadata={"help": meaning})
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
     """What `make` understands; each field tells its meaning and unit in ``metadata["help"]``."""
 
-    agents: int = _option(6, "how many agents, 1 or more; the types take turns")
-    solo: int = _option(8, "how many tasks for one agent; the types take turns")
-    preferred: int = _option(6, "how many tasks that pay more for two")
-    required: int = _option(6, "how many tasks that need two")
-    width: float = _option(100.0, "side of the square, m")
-    speed: float = _option(2.0, "speed of every agent, m/s")
-    reward: float = _option(10.0, "what a task pays one agent, score")
-    duo_reward: float = _option(30.0, "what a task pays two together, score")
-    discount: float = _option(0.01, "how fast rewards fade, 1/s")
-    fuel_per_metre: float = _option(0.05, "score lost per m flown")
-    duration: float = _option(5.0, "service of every task, s")
-    horizon: float = _option(0.0, "windows open from 0 to this time, s")
-    window: float = _option(0.0, "how long windows stay open, s; 0 for windows that never close")
+    agents: int = option(6, "how many agents, 1 or more; the types take turns")
+    solo: int = option(8, "how many tasks for one agent; the types take turns")
+    preferred: int = option(6, "how many tasks that pay more for two")
+    required: int = option(6, "how many tasks that need two")
+    width: float = option(100.0, "side of the square, m")
+    speed: float = option(2.0, "speed of every agent, m/s")
+    reward: float = option(10.0, "what a task pays one agent, score")
+    duo_reward: float = option(30.0, "what a task pays two together, score")
+    discount: float = option(0.01, "how fast rewards fade, 1/s")
+    fuel_per_metre: float = option(0.05, "score lost per m flown")
+    duration: float = option(5.0, "service of every task, s")
+    horizon: float = option(0.0, "windows open from 0 to this time, s")
+    window: float = option(0.0, "how long windows stay open, s; 0 for windows that never close")
 
     def __post_init__(self) -> None:
         faults = [
@@ -95,34 +92,24 @@ def make(seed: int = 0, **options: Any) -> Mission:
     seed : same seed, same mission.
     options : fields of `Options`.
     """
-    known = [option.name for option in fields(Options)]
-    unknown = [
-        Fault(
-            "duo2010", name, "is no option", did_you_mean(name, known) or f"Use some of {', '.join(known)}."
-        )
-        for name in options
-        if name not in known
-    ]
-    if unknown:
-        raise InputError(unknown)
-    chosen = Options(**options)
-    places = _places(seed, "agents", chosen.agents, chosen)
+    picked = chosen("duo2010", Options, options)
+    places = _places(seed, "agents", picked.agents, picked)
     agents = tuple(
         Agent(
             id=f"{TYPES[row % 2]}{row // 2:02d}",
             type=TYPES[row % 2],
             position=place,
-            speed=chosen.speed,
-            fuel_per_metre=chosen.fuel_per_metre,
+            speed=picked.speed,
+            fuel_per_metre=picked.fuel_per_metre,
             equipment=frozenset({TYPES[row % 2]}),
         )
         for row, place in enumerate(places)
     )
     return Mission(
         agents=agents,
-        tasks=(*_solo(seed, chosen), *_preferred(seed, chosen), *_required(seed, chosen)),
+        tasks=(*_solo(seed, picked), *_preferred(seed, picked), *_required(seed, picked)),
         compatible={kind: frozenset({f"solo_{kind}", "preferred", "required"}) for kind in TYPES},
-        name=f"duo2010-{chosen.agents}x{chosen.solo + chosen.preferred + chosen.required}-seed{seed}",
+        name=f"duo2010-{picked.agents}x{picked.solo + picked.preferred + picked.required}-seed{seed}",
     )
 
 

@@ -26,38 +26,35 @@ Examples
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from typing import Any
 
 from swarmbid.arrays import FloatArray
-from swarmbid.errors import Fault, InputError, did_you_mean
+from swarmbid.errors import Fault, InputError
 from swarmbid.model import Agent, Mission, Task
 from swarmbid.rng import stream
+from swarmbid.scenarios._options import chosen, option
 
 COMPATIBLE = {"QUAD": frozenset({"TRACK"}), "CAR": frozenset({"RESCUE"})}
-
-
-def _option(default: Any, meaning: str) -> Any:
-    return field(default=default, metadata={"help": meaning})
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
     """What `make` understands; each field tells its meaning and unit in ``metadata["help"]``."""
 
-    agents: int = _option(5, "how many agents, 1 or more; of two types, the first two fifths are QUAD")
-    tasks: int = _option(7, "how many tasks; of two types, the first three sevenths are TRACK")
-    self_assignment: bool = _option(False, "one type, no windows, no service, one location each")
-    half_width: float = _option(30.0, "the arena reaches so far from its middle, m")
-    lowest: float = _option(2.0, "lowest task above the ground, m")
-    highest: float = _option(10.0, "highest task above the ground, m")
-    speed: float = _option(2.0, "speed of every agent, m/s")
-    fuel_per_metre: float = _option(1.0, "score lost per m flown")
-    reward: float = _option(100.0, "value of every task, score")
-    discount: float = _option(0.1, "how fast values fade, 1/s; not used with self_assignment")
-    duration: float = _option(600.0, "service of every task, and how long its window is, s")
-    horizon: float = _option(1009.0, "windows open from 0 to this time, s")
-    bundle_limit: int = _option(3, "most tasks an agent takes at once; 0 for no limit")
+    agents: int = option(5, "how many agents, 1 or more; of two types, the first two fifths are QUAD")
+    tasks: int = option(7, "how many tasks; of two types, the first three sevenths are TRACK")
+    self_assignment: bool = option(False, "one type, no windows, no service, one location each")
+    half_width: float = option(30.0, "the arena reaches so far from its middle, m")
+    lowest: float = option(2.0, "lowest task above the ground, m")
+    highest: float = option(10.0, "highest task above the ground, m")
+    speed: float = option(2.0, "speed of every agent, m/s")
+    fuel_per_metre: float = option(1.0, "score lost per m flown")
+    reward: float = option(100.0, "value of every task, score")
+    discount: float = option(0.1, "how fast values fade, 1/s; not used with self_assignment")
+    duration: float = option(600.0, "service of every task, and how long its window is, s")
+    horizon: float = option(1009.0, "windows open from 0 to this time, s")
+    bundle_limit: int = option(3, "most tasks an agent takes at once; 0 for no limit")
 
     def __post_init__(self) -> None:
         faults = [
@@ -94,26 +91,13 @@ def make(seed: int = 0, **options: Any) -> Mission:
     seed : same seed, same mission.
     options : fields of `Options`.
     """
-    known = [option.name for option in fields(Options)]
-    unknown = [
-        Fault(
-            "dymkou2019",
-            name,
-            "is no option",
-            did_you_mean(name, known) or f"Use some of {', '.join(known)}.",
-        )
-        for name in options
-        if name not in known
-    ]
-    if unknown:
-        raise InputError(unknown)
-    chosen = Options(**options)
-    name = "self-assignment" if chosen.self_assignment else "dymkou2019"
+    picked = chosen("dymkou2019", Options, options)
+    name = "self-assignment" if picked.self_assignment else "dymkou2019"
     return Mission(
-        agents=_agents(seed, chosen),
-        tasks=_tasks(seed, chosen),
-        compatible={} if chosen.self_assignment else COMPATIBLE,
-        name=f"{name}-{chosen.agents}x{chosen.tasks}-seed{seed}",
+        agents=_agents(seed, picked),
+        tasks=_tasks(seed, picked),
+        compatible={} if picked.self_assignment else COMPATIBLE,
+        name=f"{name}-{picked.agents}x{picked.tasks}-seed{seed}",
     )
 
 

@@ -21,12 +21,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from typing import Any
 
 from swarmbid.errors import Fault, InputError, did_you_mean
 from swarmbid.model import Agent, Mission, Task
 from swarmbid.rng import stream
+from swarmbid.scenarios._options import chosen, option
 
 FAMILIES = {
     "seats": "every task requires `agents_required` agents",
@@ -51,27 +52,23 @@ _CHAINED = 0.3
 """Share of the follow-ups that follow a follow-up. The paper shows that there are some; the share is ours."""
 
 
-def _option(default: Any, meaning: str) -> Any:
-    return field(default=default, metadata={"help": meaning})
-
-
 @dataclass(frozen=True, kw_only=True)
 class Options:
     """What `make` understands; each field tells its meaning and unit in ``metadata["help"]``."""
 
-    agents: int = _option(10, "how many agents, 1 or more")
-    tasks: int = _option(20, "how many tasks")
-    agents_required: int = _option(2, "agents for a task of several; with family seats for every task")
-    family: str = _option("seats", "what the tasks require: " + ", ".join(FAMILIES))
-    width: float = _option(4.5, "the room from west to east, m")
-    length: float = _option(7.5, "the room from south to north, m")
-    height: float = _option(2.0, "the room from floor to ceiling, m; agents start on the floor")
-    speed: float = _option(2.0, "speed of every agent, m/s")
-    reward: float = _option(100.0, "what each seat of a task pays, score")
-    fuel_per_metre: float = _option(1.0, "score lost per m flown")
-    horizon: float = _option(100.0, "windows open from 0 to this time, s")
-    duration_short: float = _option(5.0, "service of one half of the tasks, s; their windows last as long")
-    duration_long: float = _option(15.0, "service of the other half, s; their windows last as long")
+    agents: int = option(10, "how many agents, 1 or more")
+    tasks: int = option(20, "how many tasks")
+    agents_required: int = option(2, "agents for a task of several; with family seats for every task")
+    family: str = option("seats", "what the tasks require: " + ", ".join(FAMILIES))
+    width: float = option(4.5, "the room from west to east, m")
+    length: float = option(7.5, "the room from south to north, m")
+    height: float = option(2.0, "the room from floor to ceiling, m; agents start on the floor")
+    speed: float = option(2.0, "speed of every agent, m/s")
+    reward: float = option(100.0, "what each seat of a task pays, score")
+    fuel_per_metre: float = option(1.0, "score lost per m flown")
+    horizon: float = option(100.0, "windows open from 0 to this time, s")
+    duration_short: float = option(5.0, "service of one half of the tasks, s; their windows last as long")
+    duration_long: float = option(15.0, "service of the other half, s; their windows last as long")
 
     def __post_init__(self) -> None:
         faults = [
@@ -116,21 +113,11 @@ def make(seed: int = 0, **options: Any) -> Mission:
     seed : same seed, same mission.
     options : fields of `Options`.
     """
-    known = [option.name for option in fields(Options)]
-    unknown = [
-        Fault(
-            "hunt2014", name, "is no option", did_you_mean(name, known) or f"Use some of {', '.join(known)}."
-        )
-        for name in options
-        if name not in known
-    ]
-    if unknown:
-        raise InputError(unknown)
-    chosen = Options(**options)
+    picked = chosen("hunt2014", Options, options)
     return Mission(
-        agents=_agents(seed, chosen),
-        tasks=_tasks(seed, chosen),
-        name=f"hunt2014-{chosen.family.replace('_', '-')}-{chosen.agents}x{chosen.tasks}-seed{seed}",
+        agents=_agents(seed, picked),
+        tasks=_tasks(seed, picked),
+        name=f"hunt2014-{picked.family.replace('_', '-')}-{picked.agents}x{picked.tasks}-seed{seed}",
     )
 
 

@@ -14,11 +14,11 @@ Examples
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
-from swarmbid.errors import Fault, InputError
-from swarmbid.scenarios._search import check, chosen, free_places, square_with_hole, vehicles
+from swarmbid.scenarios._options import chosen, option
+from swarmbid.scenarios._search import check, free_places, square_with_hole, vehicles
 from swarmbid.world.mission import SearchMission
 from swarmbid.world.sensor import Sensor
 from swarmbid.world.targets import Target
@@ -27,38 +27,31 @@ EQUIPMENT = ("camera", "rangefinder")
 """What a group must bring; the UAVs carry one each, in turn."""
 
 
-def _option(default: Any, meaning: str) -> Any:
-    return field(default=default, metadata={"help": meaning})
-
-
 @dataclass(frozen=True, kw_only=True)
 class Options:
     """What `make` understands; each field tells its meaning and unit in ``metadata["help"]``."""
 
-    uavs: int = _option(6, "how many UAVs, 2 or more")
-    static: int = _option(6, "how many targets, all at rest")
-    width: float = _option(3000.0, "side of the square, m")
-    hole: float = _option(400.0, "side of the no-fly zone, m; 0 for none")
-    duration: float = _option(1500.0, "how long the mission lasts, s")
-    speed: float = _option(20.0, "speed of every UAV, m/s")
-    turn_radius: float = _option(40.0, "tightest turn, m; 0 for one that can hover")
-    altitude: float = _option(120.0, "above ground, m")
-    view: float = _option(90.0, "field of view of the sensor that searches, degrees")
-    detection: float = _option(0.8, "probability to detect a target below in one look, 0 to 1")
-    endurance: float = _option(1800.0, "s in the air with full tanks")
-    reserve: float = _option(120.0, "s of fuel that are never used")
-    radio_range: float = _option(0.0, "m; 0 for one without limit")
-    dwell: float = _option(20.0, "how long a group looks at a target, s")
-    revisit: float = _option(0.0, "s between further visits to a target; 0 for none")
+    uavs: int = option(6, "how many UAVs, 2 or more")
+    static: int = option(6, "how many targets, all at rest")
+    width: float = option(3000.0, "side of the square, m")
+    hole: float = option(400.0, "side of the no-fly zone, m; 0 for none")
+    duration: float = option(1500.0, "how long the mission lasts, s")
+    speed: float = option(20.0, "speed of every UAV, m/s")
+    turn_radius: float = option(40.0, "tightest turn, m; 0 for one that can hover")
+    altitude: float = option(120.0, "above ground, m")
+    view: float = option(90.0, "field of view of the sensor that searches, degrees")
+    detection: float = option(0.8, "probability to detect a target below in one look, 0 to 1")
+    endurance: float = option(1800.0, "s in the air with full tanks")
+    reserve: float = option(120.0, "s of fuel that are never used")
+    radio_range: float = option(0.0, "m; 0 for one without limit")
+    dwell: float = option(20.0, "how long a group looks at a target, s")
+    revisit: float = option(0.0, "s between further visits to a target; 0 for none")
 
     def __post_init__(self) -> None:
         lowest: dict[str, float]
         lowest = {"uavs": len(EQUIPMENT), "static": 0, "hole": 0, "turn_radius": 0, "reserve": 0,
                   "radio_range": 0, "dwell": 0, "detection": 0, "revisit": 0}  # fmt: skip
         check("identify", self, lowest, ("width", "duration", "speed", "altitude", "view", "endurance"))
-        if self.hole > 0.4 * self.width:
-            mend = f"Give at most {0.4 * self.width:g}, so that it fits."
-            raise InputError([Fault("identify", "hole", f"is {self.hole:g}", mend)])
 
 
 OPTIONS = Options()
@@ -73,8 +66,8 @@ def make(seed: int = 0, **options: Any) -> SearchMission:
     seed : same seed, same mission.
     options : fields of `Options`.
     """
-    picked: Options = chosen("identify", Options, options)
-    area = square_with_hole(picked.width, picked.hole)
+    picked = chosen("identify", Options, options)
+    area = square_with_hole("identify", picked.width, picked.hole)
     sensor = Sensor(
         half_angle=math.radians(picked.view) / 2.0,
         detection=picked.detection,

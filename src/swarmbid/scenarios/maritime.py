@@ -16,12 +16,13 @@ Examples
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from swarmbid.errors import Fault, InputError
 from swarmbid.rng import stream
-from swarmbid.scenarios._search import Point, check, chosen
+from swarmbid.scenarios._options import chosen, option
+from swarmbid.scenarios._search import Point, check
 from swarmbid.world.area import Area
 from swarmbid.world.mission import SearchMission
 from swarmbid.world.sensor import Sensor
@@ -36,33 +37,29 @@ MARGIN = 0.05
 """Share of the width that whatever drifts keeps from the edge at the start."""
 
 
-def _option(default: Any, meaning: str) -> Any:
-    return field(default=default, metadata={"help": meaning})
-
-
 @dataclass(frozen=True, kw_only=True)
 class Options:
     """What `make` understands; each field tells its meaning and unit in ``metadata["help"]``."""
 
-    uavs: int = _option(3, "how many UAVs, 1 or more")
-    ships: int = _option(1, "how many ships: slow, but not short of fuel")
-    rafts: int = _option(1, "how many drift, 1 or more; of one, it is known that there is one")
-    width: float = _option(10000.0, "side of the square of sea, m; the harbour is amid its south edge")
-    duration: float = _option(3600.0, "how long the mission lasts, s")
-    elapsed: float = _option(1800.0, "s since the last known position when the search begins")
-    sigma: float = _option(600.0, "standard deviation of the last known position, m")
-    current: float = _option(0.8, "speed of the current, m/s, towards the north-east")
-    leeway: float = _option(0.4, "mean speed of the leeway, m/s, towards the east")
-    leeway_sigma: float = _option(0.12, "its standard deviation on either axis, m/s")
-    speed: float = _option(22.0, "speed of every UAV, m/s")
-    turn_radius: float = _option(60.0, "tightest turn of a UAV, m")
-    altitude: float = _option(150.0, "of the UAVs above the water, m")
-    reach: float = _option(220.0, "how far a UAV or a lookout sees a raft, m")
-    detection: float = _option(0.6, "probability to detect a raft within reach in one look, 0 to 1")
-    endurance: float = _option(2400.0, "s in the air with full tanks")
-    reserve: float = _option(180.0, "s of fuel that are never used")
-    ship_speed: float = _option(12.0, "speed of a ship, m/s")
-    radio_range: float = _option(0.0, "m; 0 for one without limit")
+    uavs: int = option(3, "how many UAVs, 1 or more")
+    ships: int = option(1, "how many ships: slow, but not short of fuel")
+    rafts: int = option(1, "how many drift, 1 or more; of one, it is known that there is one")
+    width: float = option(10000.0, "side of the square of sea, m; the harbour is amid its south edge")
+    duration: float = option(3600.0, "how long the mission lasts, s")
+    elapsed: float = option(1800.0, "s since the last known position when the search begins")
+    sigma: float = option(600.0, "standard deviation of the last known position, m")
+    current: float = option(0.8, "speed of the current, m/s, towards the north-east")
+    leeway: float = option(0.4, "mean speed of the leeway, m/s, towards the east")
+    leeway_sigma: float = option(0.12, "its standard deviation on either axis, m/s")
+    speed: float = option(22.0, "speed of every UAV, m/s")
+    turn_radius: float = option(60.0, "tightest turn of a UAV, m")
+    altitude: float = option(150.0, "of the UAVs above the water, m")
+    reach: float = option(220.0, "how far a UAV or a lookout sees a raft, m")
+    detection: float = option(0.6, "probability to detect a raft within reach in one look, 0 to 1")
+    endurance: float = option(2400.0, "s in the air with full tanks")
+    reserve: float = option(180.0, "s of fuel that are never used")
+    ship_speed: float = option(12.0, "speed of a ship, m/s")
+    radio_range: float = option(0.0, "m; 0 for one without limit")
 
     def __post_init__(self) -> None:
         zero = (
@@ -103,7 +100,7 @@ def make(seed: int = 0, **options: Any) -> SearchMission:
     seed : same seed, same mission.
     options : fields of `Options`.
     """
-    picked: Options = chosen("maritime", Options, options)
+    picked = chosen("maritime", Options, options)
     width, elapsed = picked.width, picked.elapsed
     area = Area(((0.0, 0.0), (width, 0.0), (width, width), (0.0, width)))
     drift = _drift(picked)

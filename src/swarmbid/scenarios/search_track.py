@@ -14,11 +14,12 @@ Examples
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from swarmbid.rng import stream
-from swarmbid.scenarios._search import check, chosen, free_places, square_with_hole, vehicles
+from swarmbid.scenarios._options import chosen, option
+from swarmbid.scenarios._search import check, free_places, square_with_hole, vehicles
 from swarmbid.world.mission import SearchMission
 from swarmbid.world.sensor import Sensor
 from swarmbid.world.targets import Target
@@ -27,30 +28,26 @@ KINDS = ("constant_velocity", "random_walk", "evasive")
 """Kinds of moving targets, in turn."""
 
 
-def _option(default: Any, meaning: str) -> Any:
-    return field(default=default, metadata={"help": meaning})
-
-
 @dataclass(frozen=True, kw_only=True)
 class Options:
     """What `make` understands; each field tells its meaning and unit in ``metadata["help"]``."""
 
-    uavs: int = _option(6, "how many UAVs, 1 or more")
-    static: int = _option(6, "how many targets that rest")
-    moving: int = _option(3, "how many targets that move")
-    width: float = _option(4000.0, "side of the square, m")
-    hole: float = _option(600.0, "side of the no-fly zone, m; 0 for none")
-    duration: float = _option(1800.0, "how long the mission lasts, s")
-    speed: float = _option(20.0, "speed of every UAV, m/s")
-    turn_radius: float = _option(40.0, "tightest turn, m; 0 for one that can hover")
-    altitude: float = _option(120.0, "above ground, m")
-    view: float = _option(90.0, "field of view of the camera, degrees")
-    detection: float = _option(0.8, "probability to detect a target below in one look, 0 to 1")
-    endurance: float = _option(1800.0, "s in the air on the best battery; the oldest lasts 0.6 of it")
-    reserve: float = _option(120.0, "s of fuel that are never used")
-    radio_range: float = _option(0.0, "m; 0 for one without limit")
-    target_speed: float = _option(4.0, "of moving targets, m/s")
-    dwell: float = _option(20.0, "how long a static target is looked at, s")
+    uavs: int = option(6, "how many UAVs, 1 or more")
+    static: int = option(6, "how many targets that rest")
+    moving: int = option(3, "how many targets that move")
+    width: float = option(4000.0, "side of the square, m")
+    hole: float = option(600.0, "side of the no-fly zone, m; 0 for none")
+    duration: float = option(1800.0, "how long the mission lasts, s")
+    speed: float = option(20.0, "speed of every UAV, m/s")
+    turn_radius: float = option(40.0, "tightest turn, m; 0 for one that can hover")
+    altitude: float = option(120.0, "above ground, m")
+    view: float = option(90.0, "field of view of the camera, degrees")
+    detection: float = option(0.8, "probability to detect a target below in one look, 0 to 1")
+    endurance: float = option(1800.0, "s in the air on the best battery; the oldest lasts 0.6 of it")
+    reserve: float = option(120.0, "s of fuel that are never used")
+    radio_range: float = option(0.0, "m; 0 for one without limit")
+    target_speed: float = option(4.0, "of moving targets, m/s")
+    dwell: float = option(20.0, "how long a static target is looked at, s")
 
     def __post_init__(self) -> None:
         lowest = {"uavs": 1, "static": 0, "moving": 0, "hole": 0, "turn_radius": 0, "reserve": 0,
@@ -71,8 +68,8 @@ def make(seed: int = 0, **options: Any) -> SearchMission:
     seed : same seed, same mission.
     options : fields of `Options`.
     """
-    picked: Options = chosen("search_track", Options, options)
-    area = square_with_hole(picked.width, picked.hole)
+    picked = chosen("search_track", Options, options)
+    area = square_with_hole("search_track", picked.width, picked.hole)
     sensor = Sensor(
         half_angle=math.radians(picked.view) / 2.0,
         detection=picked.detection,

@@ -14,7 +14,7 @@ Examples
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,35 +24,32 @@ from swarmbid.errors import Fault, InputError
 from swarmbid.model import Agent, Mission, Position, Task
 from swarmbid.network import connected_positions, positions_with_mean_degree
 from swarmbid.rng import stream
-
-
-def _option(default: Any, meaning: str) -> Any:
-    return field(default=default, metadata={"help": meaning})
+from swarmbid.scenarios._options import chosen, option
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
     """What `make` understands; each field tells its meaning and unit in ``metadata["help"]``."""
 
-    agents: int = _option(20, "how many agents, 1 or more")
-    tasks: int = _option(100, "how many tasks")
-    width: float = _option(1000.0, "side of the square, m")
-    height: float = _option(0.0, "tasks lie from 0 to this height, m")
-    grid: int = _option(0, "put everything on a grid of so many positions a side, for ties; 0 for anywhere")
-    speed: float = _option(10.0, "speed of every agent, m/s")
-    fuel_per_metre: float = _option(0.0, "score lost per m flown")
-    bundle_limit: int = _option(10, "most tasks an agent takes at once; 0 for no limit")
-    reward_min: float = _option(10.0, "lowest reward, score")
-    reward_max: float = _option(100.0, "highest reward, score; equal to reward_min for ties")
-    discount: float = _option(0.01, "how fast rewards fade, 1/s")
-    duration_min: float = _option(0.0, "shortest service, s")
-    duration_max: float = _option(0.0, "longest service, s")
-    horizon: float = _option(0.0, "windows open from 0 to this time, s")
-    window_min: float = _option(0.0, "shortest window, s")
-    window_max: float = _option(0.0, "longest window, s; 0 for windows that never close")
-    types: int = _option(1, "how many types of tasks, each done only by agents of its own type")
-    communication_range: float = _option(0.0, "place agents so that this range connects them, m; 0 for not")
-    mean_degree: float = _option(
+    agents: int = option(20, "how many agents, 1 or more")
+    tasks: int = option(100, "how many tasks")
+    width: float = option(1000.0, "side of the square, m")
+    height: float = option(0.0, "tasks lie from 0 to this height, m")
+    grid: int = option(0, "put everything on a grid of so many positions a side, for ties; 0 for anywhere")
+    speed: float = option(10.0, "speed of every agent, m/s")
+    fuel_per_metre: float = option(0.0, "score lost per m flown")
+    bundle_limit: int = option(10, "most tasks an agent takes at once; 0 for no limit")
+    reward_min: float = option(10.0, "lowest reward, score")
+    reward_max: float = option(100.0, "highest reward, score; equal to reward_min for ties")
+    discount: float = option(0.01, "how fast rewards fade, 1/s")
+    duration_min: float = option(0.0, "shortest service, s")
+    duration_max: float = option(0.0, "longest service, s")
+    horizon: float = option(0.0, "windows open from 0 to this time, s")
+    window_min: float = option(0.0, "shortest window, s")
+    window_max: float = option(0.0, "longest window, s; 0 for windows that never close")
+    types: int = option(1, "how many types of tasks, each done only by agents of its own type")
+    communication_range: float = option(0.0, "place agents so that this range connects them, m; 0 for not")
+    mean_degree: float = option(
         0.0, "place agents so that the range with so many neighbours each connects them; 0 for not"
     )
 
@@ -112,20 +109,12 @@ def make(seed: int = 0, **options: Any) -> Mission:
     seed : same seed, same mission.
     options : fields of `Options`.
     """
-    known = [option.name for option in fields(Options)]
-    unknown = [
-        Fault("uniform", name, "is no option", f"Use some of {', '.join(known)}.")
-        for name in options
-        if name not in known
-    ]
-    if unknown:
-        raise InputError(unknown)
-    chosen = Options(**options)
+    picked = chosen("uniform", Options, options)
     return Mission(
-        agents=_agents(seed, chosen),
-        tasks=_tasks(seed, chosen),
-        compatible={_kind(k): frozenset({_kind(k)}) for k in range(chosen.types)} if chosen.types > 1 else {},
-        name=f"uniform-{chosen.agents}x{chosen.tasks}-seed{seed}",
+        agents=_agents(seed, picked),
+        tasks=_tasks(seed, picked),
+        compatible={_kind(k): frozenset({_kind(k)}) for k in range(picked.types)} if picked.types > 1 else {},
+        name=f"uniform-{picked.agents}x{picked.tasks}-seed{seed}",
     )
 
 
