@@ -30,6 +30,8 @@ RESTATE_EVERY = 5.0
 """s between two times at which the negotiator is told where the UAV is."""
 
 
+FreeAt = Callable[[float], float]
+"""From now, s, to when a UAV is free for something new, s; infinite for never."""
 NEVER = 1e9
 """s: later than any mission ends."""
 
@@ -49,8 +51,8 @@ class Allocation(ABC):
         """This UAV found `task`; keep : it takes it itself at once."""
 
     @abstractmethod
-    def at(self, state: VehicleState, free_at: float, now: float, contacts: Contacts) -> None:
-        """The UAV is there, free for something new from `free_at` s on, and knows of these contacts."""
+    def at(self, state: VehicleState, free_at: FreeAt, now: float, contacts: Contacts) -> None:
+        """The UAV is there and knows of these contacts; `free_at` tells from when on it is free."""
 
     @property
     @abstractmethod
@@ -139,11 +141,15 @@ class _Negotiated(Allocation):
         self._ended.add(task)
         self.negotiator.finish_task(task, now)
 
-    def at(self, state: VehicleState, free_at: float, now: float, contacts: Contacts) -> None:
+    def at(self, state: VehicleState, free_at: FreeAt, now: float, contacts: Contacts) -> None:
         """See `Allocation.at`."""
         if now - self._told_at >= RESTATE_EVERY:
             self._told_at = now
-            self.negotiator.set_position((state.x, state.y, 0.0), min(free_at, NEVER))
+            self.negotiator.set_position((state.x, state.y, 0.0), self._free_from(free_at(now), now))
+
+    def _free_from(self, free_at: float, now: float) -> float:
+        """From when on bids count, s, for a UAV that is free at `free_at`."""
+        return min(free_at, NEVER)
 
     def lose(self, agent: str) -> None:
         """See `Allocation.lose`."""
@@ -175,9 +181,9 @@ class ByContract(_Negotiated):
         self.net = ContractNet(agent, roster, "time_discounted", may=self._refusal, **options)
         super().__init__(self.net)
 
-    def at(self, state: VehicleState, free_at: float, now: float, contacts: Contacts) -> None:
-        """See `Allocation.at`; whether it is free at all is for `may` to judge."""
-        super().at(state, now if math.isinf(free_at) else free_at, now, contacts)
+    def _free_from(self, free_at: float, now: float) -> float:
+        """Whether it is free at all is for `may` to judge."""
+        return now if math.isinf(free_at) else free_at
 
     def standing_of(self, task: str) -> tuple[str, tuple[str, ...]]:
         """See `Allocation.standing_of`."""
@@ -238,7 +244,7 @@ class ByConsensus(_Negotiated):
     def announce(self, task: Task, now: float, keep: bool = False) -> None:
         """See `Allocation.announce`: the contact is announcement enough."""
 
-    def at(self, state: VehicleState, free_at: float, now: float, contacts: Contacts) -> None:
+    def at(self, state: VehicleState, free_at: FreeAt, now: float, contacts: Contacts) -> None:
         """See `Allocation.at`."""
         for name, contact in contacts.known.items():
             if name not in self._known and name not in self._agents:
@@ -325,7 +331,7 @@ class ByCentre(Allocation):
         else:
             self.centre.allocate(task, now)
 
-    def at(self, state: VehicleState, free_at: float, now: float, contacts: Contacts) -> None:
+    def at(self, state: VehicleState, free_at: FreeAt, now: float, contacts: Contacts) -> None:
         """See `Allocation.at`."""
         self.centre.places[self.agent] = (state.x, state.y, 0.0)
 

@@ -138,7 +138,7 @@ class SearchTrack:
         self._watch_others(now)
         self._end_doubles(now)
         self._identify(now)
-        self.allocation.at(state, self._free_at(now), now, self.contacts)
+        self.allocation.at(state, self._free_at, now, self.contacts)
         if self.standing:
             contracts = [task for task, _ in self.allocation.path]
             self.standing.at(now, state, self.mode, self.contacts, contracts)
