@@ -223,6 +223,10 @@ def _of_detections(life: Life) -> Iterator[Moment]:
         yield Moment(one.t, one.agent, "other" if number else "detection", what)
 
 
+INFORMS = {"contracted": "has it under contract", "started": "begins"}
+"""What a holder informs of; else it is the manager's word that the contract is in force."""
+
+
 def _of_acts(life: Life) -> Iterator[Moment]:
     """Tell what was said; one announcement to many receivers at one time is one moment."""
     asked: dict[tuple[float, str, str], list[str]] = {}
@@ -235,7 +239,7 @@ def _of_acts(life: Life) -> Iterator[Moment]:
     for act in life.acts:
         if act.performative == ANNOUNCE:
             continue
-        because = f" ({act.detail})" if act.detail else ""
+        because = f" ({act.detail})" if act.detail.strip() else ""
         bid = "" if act.bid is None else f" {act.bid:.6g}"
         to = act.to or "everybody"
         kind, what = {
@@ -246,7 +250,8 @@ def _of_acts(life: Life) -> Iterator[Moment]:
             "confirm": ("other", f"confirms to {to} that it takes it{because}"),
             "failure": ("other", f"tells {to} that it cannot{because}"),
             "cancel": ("other", f"calls it off with {to}{because}"),
-            "inform-done": ("other", f"tells {to} that it is done{because}"),
+            "inform-done": ("other", "says that it is done"),
+            "inform": ("other", INFORMS.get(act.detail, f"puts the contract with {to} in force")),
         }.get(act.performative, ("other", f"says {act.performative} to {to}{because}"))
         if act.performative == ACCEPT and act.to == act.agent:
             what = f"takes it itself{' for' + bid if bid else ''}{because}"
