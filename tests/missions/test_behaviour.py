@@ -61,8 +61,8 @@ class Notes(Allocation):
         self.done.append(("finish", task))
         self.todo.remove(task)
 
-    def fail(self, task, reason, now):
-        self.done.append(("fail", task, reason))
+    def give_back(self, task, now):
+        self.done.append(("give_back", task))
         self.todo.remove(task)
 
     def cancel(self, task):
@@ -221,7 +221,7 @@ class TestDoing:
         assert one.mode == "transit" and one.following == "u1-t1"
         for now in range(30 + BLINKS, 30 + BLINKS + int(LOST_AFTER) + 10):  # it flies where it should be
             list(hover(one, 1, begin=now, state=VehicleState(*(one.goal or (400.0, 400.0)))))
-        assert ("fail", "u1-t1", "lost") in one.allocation.done and one.following is None
+        assert ("cancel", "u1-t1") in one.allocation.done and one.following is None
         assert one.contacts.known["u1-t1"].over
 
     def test_a_follower_looks_for_a_successor_in_time_then_gives_back_and_flies_home(self):
@@ -243,7 +243,7 @@ class TestDoing:
                 one.allocation.todo = ["u1-t1"]
             for what in one.allocation.done:
                 begun.setdefault(" ".join(what), now)
-        assert 100 <= begun["hand over u1-t1"] <= 130 < begun["fail u1-t1 no_fuel"] < 270
+        assert 100 <= begun["hand over u1-t1"] <= 130 < begun["give_back u1-t1"] < 270
         assert one.mode == "return" and one.goal == (400.0, 380.0)
 
     def test_on_the_ground_it_sees_nothing_and_takes_off_searching(self):

@@ -17,7 +17,6 @@ from swarmbid.algorithms.cbba import CBBA
 from swarmbid.algorithms.contract_net import ContractNet
 from swarmbid.errors import InputError
 from swarmbid.messages import Message
-from swarmbid.messages.acts import REFUSALS
 from swarmbid.missions._contacts import Contacts
 from swarmbid.model import Mission, Task
 from swarmbid.negotiator import Event, Negotiator
@@ -84,8 +83,8 @@ class Allocation(ABC):
         """This UAV has done it."""
 
     @abstractmethod
-    def fail(self, task: str, reason: str, now: float) -> None:
-        """This UAV cannot do it."""
+    def give_back(self, task: str, now: float) -> None:
+        """This UAV flies home to refuel: the task is for another, or for itself when it is back."""
 
     @abstractmethod
     def cancel(self, task: str) -> None:
@@ -207,12 +206,10 @@ class ByContract(_Negotiated):
         outcome = self.net.outcomes().get(task)
         return outcome is not None and outcome.state in ("contracted", "started", "done", "cancelled")
 
-    def fail(self, task: str, reason: str, now: float) -> None:
-        """See `Allocation.fail`."""
+    def give_back(self, task: str, now: float) -> None:
+        """See `Allocation.give_back`."""
         self._started.discard(task)
-        # Who flies home to refuel may take it again; who has lost a target may not.
-        give_up = self.net.give_back if reason in REFUSALS else self.net.fail_task
-        give_up(task, reason, now)
+        self.net.give_back(task, "no_fuel", now)
 
     def cancel(self, task: str) -> None:
         """See `Allocation.cancel`."""
@@ -263,9 +260,12 @@ class ByConsensus(_Negotiated):
         """See `Allocation.served`."""
         return task in self._ended or bool(self.cbba.beliefs().get(task))
 
-    def fail(self, task: str, reason: str, now: float) -> None:
-        """See `Allocation.fail`: CBBA has no failure, so nobody does it again."""
-        self.cancel(task)
+    def give_back(self, task: str, now: float) -> None:
+        """See `Allocation.give_back`: what was not begun goes as bids count from never; CBBA cannot
+        give back what was, so nobody does that again.
+        """
+        if task in self._started:
+            self.cancel(task)
 
     def cancel(self, task: str) -> None:
         """See `Allocation.cancel`."""
@@ -361,12 +361,11 @@ class ByCentre(Allocation):
         self.centre.done.add(task)
         self.centre.paths[self.agent].remove(task)
 
-    def fail(self, task: str, reason: str, now: float) -> None:
-        """See `Allocation.fail`."""
+    def give_back(self, task: str, now: float) -> None:
+        """See `Allocation.give_back`."""
         self._started.discard(task)
         self.centre.paths[self.agent].remove(task)
-        if reason != "lost":
-            self.centre.allocate(self.centre.tasks[task], now, without=self.agent)
+        self.centre.allocate(self.centre.tasks[task], now, without=self.agent)
 
     def cancel(self, task: str) -> None:
         """See `Allocation.cancel`."""

@@ -343,7 +343,7 @@ class SearchTrack:
             self._followed_at = now  # it is not there yet
         elif now - self._followed_at > LOST_AFTER:
             self.contacts.close(task, now)
-            self.allocation.fail(task, "lost", now)
+            self.allocation.cancel(task)
             self._release()
             return None
         self.mode = "track" if seen else "transit"
@@ -361,6 +361,6 @@ class SearchTrack:
     def _give_back(self, now: float) -> None:
         """Before flying home: what cannot be done any more is for somebody else."""
         for task, _ in list(self.allocation.path):
-            self.allocation.fail(task, "no_fuel", now)
+            self.allocation.give_back(task, now)
         self._offered.clear()
         self._release()
