@@ -391,8 +391,6 @@ that knew where the person is would find it in every episode, and in {soonest:.1
 all of it the flight of 20 cells from the edge. That is a bound for every policy. By then the person may be in
 any of some two dozen cells, and four drones look into two a step.
 
-**What helps is the rule, not the auction**: knowing the matrix alone, ours is no better than the small one.
-The matrix misleads who trusts it. In 150 other episodes its peak was ahead of the mean person by 1.8 cells
-along x and 2.0 along y after 20 steps, for a person waits until it has drifted a whole cell; and it is wider
-than persons scatter (2.6 cells a standard deviation against 1.2). To follow the peak, as the greedy rule
-does, is to leave the person behind."""
+**What helps most is the rule, not the auction**: knowing the matrix alone, ours is not far from the small
+auction, and behind its tuned form. The matrix misleads who trusts it: its peak runs ahead of the person, who
+waits until it has drifted a whole cell. To follow the peak, as the greedy rule does, is to leave the person behind."""
