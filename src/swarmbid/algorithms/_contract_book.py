@@ -143,7 +143,8 @@ class Book:
         """How far the task has come; follows from the acts that were heard.
 
         What is said under an epoch that is known to be over counts no more, but for a task that is under
-        way: its manager will lift it. What this agent itself has begun is its own until it is over.
+        way: its manager will lift it. A contract lasts until its contractor says that it has failed. What
+        this agent itself has begun is its own until it is over.
         """
         ids = arrays.agent_ids
         holder = self.me if self.part == STARTED else self.holder()
@@ -152,13 +153,18 @@ class Book:
         top = self.top(arrays)
         if top is not None and top[1].epoch >= self.floor:
             act = top[1]
-            if act.performative == INFORM:
+            if act.performative == INFORM and not self._given_back(arrays, act):
                 return Outcome(CONTRACTED, act.to, "", self.floor)
         if holder >= 0 and (top is None or top[1].epoch >= self.floor):
             return Outcome(CONTRACTED, ids[holder], "", self.floor)  # its manager is gone, or a hand-over
         if self.parked is not None:
             return Outcome(self.parked_as, "", self.parked.reason, self.floor)
         return Outcome("open", "", "", self.floor)
+
+    def _given_back(self, arrays: MissionArrays, contract: Act) -> bool:
+        """Whether who is under contract has failed since or given the task back; its manager will call."""
+        act = self.answers.get(arrays.agent_row[contract.to])
+        return act is not None and act.performative == FAILURE and act.epoch >= contract.epoch
 
     @property
     def parked_as(self) -> str:
