@@ -520,6 +520,10 @@ class Flight:
         for task_id, _ in craft.one.path:
             self.disturbed[task_id] += 1
         self._tell("leaves", craft)
+        for other in self.rows:  # its last word may be lost, or find nobody in earshot
+            if other != craft.id:
+                late = max(self.now, self.case.calm_at) + self.case.detection
+                self.push(late, "verdict", other, craft.id, craft.incarnation, order=True)
         if craft.doing is not None:  # it finishes that, and counts as having done it
             self.finished[craft.doing].add((craft.id, craft.incarnation))
         craft.one.leave()
@@ -589,7 +593,7 @@ class Flight:
     def _do_verdict(self, name: str, gone: str, incarnation: int) -> None:
         self.pending -= 1
         craft, other = self.crafts[name], self.crafts[gone]
-        if craft.up and not other.up and other.incarnation == incarnation:
+        if craft.up and (not other.up or other.leaving) and other.incarnation == incarnation:
             self._tell(f"is told that {gone} is lost", craft)
             craft.one.lose_agent(gone)
             for task_id in self.reopened:

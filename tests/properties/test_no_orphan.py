@@ -55,12 +55,11 @@ SOMETIMES: dict[str, tuple[str, ...]] = {
 """What must have happened at least once in the runs of a family; else they prove nothing about it."""
 
 
-GAPS = {("all", 28): "L3"}
-"""Seeds that are known to break a rule, which: under "hold", with one of six gone, a holder never gets a
-live lease. Whoever mends it sees this list fail."""
-
 MENDED = (
     ("busy", 363),  # a failed contract looked like the contract before its start
+    ("all", 28),  # leases that had never been a majority together kept an agent from starting for ever
+    ("all", 202),  # who had left out of earshot was under contract for ever
+    ("all", 354),  # the successor was gone, and all went by a call that its speaker had withdrawn
 )
 """Seeds that have broken a rule, and what was wrong."""
 
@@ -75,11 +74,6 @@ def test_whatever_breaks_no_task_is_orphaned(family: str, effort: int):
     """Every rule of `contract_faults` holds of every seed, and every fault came up."""
     seen: Counter[str] = Counter()
     for seed in range(RUNS[family] * effort):
-        if (family, seed) in GAPS:
-            with pytest.raises(Broken) as broken:
-                play(family, seed)
-            assert broken.value.rule == GAPS[family, seed]
-            continue
         seen += play(family, seed).seen
     assert never(family, seen) == []
 

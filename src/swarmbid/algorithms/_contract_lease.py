@@ -53,7 +53,9 @@ class Leases:
         if word not in self._said:
             return
         # A shorter lapse cannot have given the task to another: a successor waits a lease at least.
-        lapsed = self._had and not self._majority(now) and now - self._majority_until() >= self.lease
+        # Who has never had a majority has leases that ended at different times: they say nothing.
+        lapse = math.inf if math.isinf(self._since) else now - self._majority_until()
+        lapsed = self._had and not self._majority(now) and lapse >= self.lease
         self._until[row] = max(float(self._until[row]), self._said[word] + self.lease)
         if self._majority(now):
             self._had = True

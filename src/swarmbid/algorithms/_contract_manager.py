@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import Any
 
 from swarmbid.algorithms._contract_book import HAND_OVER, STARTED, TAKE_OVER, Book
+from swarmbid.algorithms._contract_contractor import OUTDATED
 from swarmbid.algorithms._contract_judge import Judge
 from swarmbid.algorithms._contract_tables import MANAGER, MANAGER_EVENTS, NOTHING
 from swarmbid.messages.acts import (
@@ -128,13 +129,19 @@ class ManagerSide(Judge):
         if book.top(self._arrays) is not None:
             book.vacant = book.deadline = math.inf
             return False
-        turn = book.turn(self._arrays, self._absent, self._me)
+        turn = 0 if self._resumes(book) else book.turn(self._arrays, self._absent, self._me)
         if not book.found and turn > 0:
             return False
         book.vacant = min(book.vacant, now)
         wait = turn * self._reply_within + (self._grace(book) if self._absent else 0.0)
         book.deadline = max(book.vacant + wait, self._hears_until)
         return now >= book.deadline
+
+    def _resumes(self, book: Book) -> bool:
+        """Whether this agent has yielded to one that is gone, and others still go by its own old call."""
+        return book.stage == "yielded" and any(
+            act.to == self.agent_id and act.reason == OUTDATED for act in book.asides.values()
+        )
 
     def _grace(self, book: Book) -> float:
         """s after which nobody out of earshot can still begin the task, or be at it."""
