@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import random
 from collections import Counter
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -82,6 +83,12 @@ def test_whatever_breaks_no_task_is_orphaned(family: str, effort: int):
 def test_what_once_broke_a_rule_does_so_no_more(family: str, seed: int):
     """Seeds beyond the plain runs."""
     play(family, seed)
+
+
+def test_a_short_lease_may_be_useless_but_not_unsafe():
+    """Two agents began one task after a lapse of the leases that was shorter than a lease."""
+    case = case_of("hold", 236)
+    play("hold", 236, case=replace(case, options={**case.options, "lease": 8.0}))
 
 
 def test_the_same_seed_flies_the_same_flight():

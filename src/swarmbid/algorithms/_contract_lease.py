@@ -6,8 +6,8 @@ the word was SAID: the answer may take its time. An agent may begin a task while
 than half of the team, itself included (of an even half, from the half with the first agent in order of
 id). Of two parts of a team that cannot hear each other only one can: the other's leases end one lease
 after they were parted at the latest, and a successor there waits for that, and for what may then have
-been begun to be over. Who was without a majority for a lease waits one more when it has it again, to
-hear what has happened since. (Leases: Gray and Cheriton 1989; majorities: Gifford 1979.)
+been begun to be over. Who was without a majority, however shortly, waits a lease when it has one
+again, to hear what has happened since. (Leases: Gray and Cheriton 1989; majorities: Gifford 1979.)
 """
 
 from __future__ import annotations
@@ -52,10 +52,8 @@ class Leases:
         """An agent has heard a word of this one."""
         if word not in self._said:
             return
-        # A shorter lapse cannot have given the task to another: a successor waits a lease at least.
-        # Who has never had a majority has leases that ended at different times: they say nothing.
-        lapse = math.inf if math.isinf(self._since) else now - self._majority_until()
-        lapsed = self._had and not self._majority(now) and lapse >= self.lease
+        # However short a lapse was, the task may have been given to another before it ended.
+        lapsed = self._had and not self._majority(now)
         self._until[row] = max(float(self._until[row]), self._said[word] + self.lease)
         if self._majority(now):
             self._had = True
@@ -71,11 +69,6 @@ class Leases:
         yes[self._me] = True
         twice = 2 * int(np.count_nonzero(yes))
         return twice > yes.size or (twice == yes.size and bool(yes[0]))
-
-    def _majority_until(self) -> float:
-        others = np.sort(np.delete(self._until, self._me))[::-1]
-        needed = self._until.size // 2  # others, besides this agent
-        return float(others[needed - 1]) if needed else math.inf
 
 
 def mark(number: int) -> float:

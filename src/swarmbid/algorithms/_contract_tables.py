@@ -49,8 +49,8 @@ MANAGER_EVENTS = (
     "failures",  # so, and somebody has tried and failed
     "reply_by passed",  # nobody proposes, and not all have answered
     "can now",  # an agent that had refused proposes
-    "back-off over",
     "latest start passed",
+    "back-off over",
 )
 
 CONTRACTOR_STATES = (
