@@ -393,4 +393,5 @@ any of some two dozen cells, and four drones look into two a step.
 
 **What helps most is the rule, not the auction**: knowing the matrix alone, ours is not far from the small
 auction, and behind its tuned form. The matrix misleads who trusts it: its peak runs ahead of the person, who
-waits until it has drifted a whole cell. To follow the peak, as the greedy rule does, is to leave the person behind."""
+waits until it has drifted a whole cell. To follow the peak, as the greedy rule does,
+is to leave the person behind."""
